@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,7 +10,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import UsageError, did_you_mean
 from bsip_cli.files.regular import read_toml, shipped
 
 _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
@@ -244,5 +243,4 @@ def _fault(error: Mapping) -> str:
         if not part.isdigit():
             inner = model.model_fields[part].annotation
             model = (get_args(inner) or (inner,))[0]  # the rows of a [[table]]
-    near = difflib.get_close_matches(path[-1], model.model_fields, n=1, cutoff=0.4)
-    return f"unknown option {name}" + (f" (did you mean {near[0]}?)" if near else "")
+    return f"unknown option {name}{did_you_mean(path[-1], model.model_fields)}"

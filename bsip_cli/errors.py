@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Collection
 from functools import partial
 
 
@@ -14,6 +16,12 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c == "\N{NO-BREAK SPACE}" else "?" for c in text)
+
+
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """`` (did you mean skeleton?)`` behind an unknown name; empty where none is near."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 class BsipError(Exception):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections import Counter
-from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
 
 from bsip_cli.config import shipped
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import UsageError, did_you_mean
 from bsip_cli.files.regular import read_toml
 from bsip_cli.segments import JOINT_CENTRES, LANDMARKS, SEGMENTS
 
@@ -109,11 +107,13 @@ def _faults(data: dict) -> list[str]:
     segments = data.get("segments")
     if not isinstance(segments, dict) or not segments:
         return ['no [segments]: expected lines like head = { RTEM = "temple_r" }']
-    faults = [f"unknown table {key}{_near(key, _TABLES)}" for key in sorted(set(data) - _TABLES)]
+    faults = [
+        f"unknown table {key}{did_you_mean(key, _TABLES)}" for key in sorted(set(data) - _TABLES)
+    ]
     labels: list[str] = []
     for segment, members in segments.items():
         if segment not in SEGMENTS:
-            faults.append(f"unknown segment {segment}{_near(segment, SEGMENTS)}")
+            faults.append(f"unknown segment {segment}{did_you_mean(segment, SEGMENTS)}")
         if not isinstance(members, dict):
             faults.append(f'{segment}: expected {{ LABEL = "landmark", ... }}')
             continue
@@ -122,7 +122,9 @@ def _faults(data: dict) -> list[str]:
             if not isinstance(landmark, str):
                 faults.append(f'{label}: expected the name of a landmark or ""')
             elif landmark and landmark not in LANDMARKS:
-                faults.append(f"{label}: unknown landmark {landmark}{_near(landmark, LANDMARKS)}")
+                faults.append(
+                    f"{label}: unknown landmark {landmark}{did_you_mean(landmark, LANDMARKS)}"
+                )
     faults += [f"{label} stands twice" for label, n in sorted(Counter(labels).items()) if n > 1]
     return faults + _option_faults(data, labels)
 
@@ -150,8 +152,3 @@ def _option_faults(data: dict, labels: list[str]) -> list[str]:
 
 def _are_words(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(word, str) for word in value)
-
-
-def _near(name: str, known: Collection[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-    return f" (did you mean {near[0]}?)" if near else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import sys
 from collections import Counter
@@ -17,7 +16,7 @@ from tqdm import tqdm
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config
-from bsip_cli.errors import UsageError, printable
+from bsip_cli.errors import UsageError, did_you_mean, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
 from bsip_cli.running.runner import Manner, Outcome, run_stages
 from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
@@ -266,9 +265,8 @@ def _check_known(
 ) -> None:
     for name in names:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
             raise UsageError(
-                f"{option}: there is no {name}" + (f" (did you mean {near[0]}?)" if near else ""),
+                f"{option}: there is no {name}{did_you_mean(name, known)}",
                 expected=f"one of {', '.join(known)}" if known else "none, no recording has any",
                 remedy=remedy,
             )

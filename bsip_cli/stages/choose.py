@@ -1,7 +1,4 @@
-"""choose: which parameters to use, by the errors in movements that OM never saw.
-
-Reads identification, used-blocks, and the fit and reconstruction of all trials; writes choice.
-"""
+"""choose: which parameters to use, by the errors in movements that OM never saw."""
 
 from __future__ import annotations
 

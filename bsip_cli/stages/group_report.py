@@ -1,9 +1,4 @@
-"""Report (cohort): one HTML page with the papers' tables and the gain per participant.
-
-Reads values, comparisons, person, identification, tables-files, and where they are there
-overall-diagnosis, choice and laboratory; links to the participants' reports where report-files are
-there. Writes group-report-files.
-"""
+"""Report (cohort): one HTML page with the papers' tables and the gain per participant."""
 
 from __future__ import annotations
 

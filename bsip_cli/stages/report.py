@@ -1,10 +1,4 @@
-"""Report (participant): one HTML page; its figures and the numbers behind them as files.
-
-Reads quality, skeleton, marker-positions, person, kinematics, marker-residuals, marker-events,
-bsip, excitation, identification, reconstruction, fit; where they are there overall-diagnosis,
-overall-error-budget, detection, overall-gain, bsip-change, choice, joint-moments, joint-peaks.
-Writes report-files.
-"""
+"""Report (participant): one HTML page; its figures and the numbers behind them as files."""
 
 from __future__ import annotations
 

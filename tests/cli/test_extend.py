@@ -19,24 +19,18 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.simulate.options import Asked, Rates, StudyOptions
+from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.statistics.methods import MEASURED, METHODS
 from bsip_cli.study.study import load_study
+from tests.small_study import small
 
 pytestmark = pytest.mark.long
 
-NULL = StudyOptions(
-    participants=1,
-    seed=3,
-    sexes="M",
-    tasks=("static", "sequence", "squat"),
-    durations_s={"static": 1.0, "sequence": 10.0, "squat": 6.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-)
+NULL = small(static=1.0, sequence=10.0, squat=6.0)
 LATE = replace(NULL, effects=(Asked("sync_offset", 0.02),))
 SEQUENCE, SQUAT, STATIC = (
     f"sub-01_task-{name}" for name in ("sequence_run-1", "squat_run-1", "static")

@@ -9,8 +9,8 @@ import ezc3d
 import numpy as np
 import pytest
 
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from tests.small_study import small
 
 pytestmark = pytest.mark.long
 
@@ -48,16 +48,8 @@ def hostile_marker_set() -> str:
 def ran(tmp_path_factory, bsip):
     """Everything that bsip makes of such a study, and what lay around it before."""
     folder = tmp_path_factory.mktemp("hostile")
-    options = StudyOptions(
-        participants=1,
-        seed=3,
-        sexes="M",
-        tasks=("static", "sequence"),
-        durations_s={"static": 1.0, "sequence": 6.0},
-        rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    )
     study = folder / "a" / "study"
-    simulate_study(study, options)
+    simulate_study(study, small(static=1.0, sequence=6.0))
     for path in study.glob("sub-*/*.c3d"):
         give_labels(path)
     (study / "study.toml").write_text('marker_set = "own.toml"\n')

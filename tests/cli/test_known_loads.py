@@ -15,11 +15,11 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.people import Inertia, combined
 from bsip_cli.simulate.recording import measure_trial, simulate_trial, write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.study.study import load_study
+from tests.small_study import small
 
 GOOD = '[[loads]]\nsegment = "shank_r"\nmass_kg = 1.0\nposition_m = [0.0, -0.15, 0.03]\n'
 
@@ -85,14 +85,7 @@ def test_which_trials_carry_a_load(who, trial, carried):
 PLAIN, LOADED = "sub-01_task-sequence_run-1", "sub-01_task-sequence_run-2"
 STATIC = "sub-01_task-static"
 BACKPACK = Load(segment="upper_torso", mass_kg=8.0, position_m=(-0.2, -0.2, 0.0))
-OPTIONS = StudyOptions(
-    participants=1,
-    seed=5,
-    sexes="M",
-    tasks=("static", "sequence"),
-    durations_s={"static": 1.0, "sequence": 14.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-)
+OPTIONS = small(seed=5, static=1.0, sequence=14.0)
 
 
 def with_backpack(person):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.simulate.options import Asked, Rates, StudyOptions
+from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from tests.small_study import small
 
 pytestmark = pytest.mark.long
 
@@ -21,16 +23,8 @@ PLACE = ["x_m", "y_m", "z_m"]
 def options(*tasks: str) -> StudyOptions:
     """A person whose marker is off from the first frame on, in the recordings of these tasks."""
     asked = Asked("marker_shift", OFF_M, f"{MARKER},from_s=0")
-    return StudyOptions(
-        participants=1,
-        seed=3,
-        sexes="M",
-        tasks=("static", "sequence", "squat"),
-        durations_s={"static": 1.0, "sequence": 10.0, "squat": 6.0},
-        rates={"default": Rates(marker_hz=50, analog_hz=250)},
-        effects=(asked,) if tasks else (),
-        effect_tasks=tasks,
-    )
+    plain = small(static=1.0, sequence=10.0, squat=6.0)
+    return replace(plain, effects=(asked,) if tasks else (), effect_tasks=tasks)
 
 
 @pytest.fixture(scope="module")

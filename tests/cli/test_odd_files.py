@@ -110,12 +110,6 @@ def test_other_shapes(tmp_path, reader, text, found):
     assert found in refused(READERS[reader], path)
 
 
-def test_the_command(bsip, empty_study):
-    (empty_study / "study.toml").write_bytes(NO_TOML["brackets"])
-    said = bsip("ingest", empty_study, "--out", empty_study.with_name("out"))
-    assert said.code == 2 and len(said.err.splitlines()) == 1
-
-
 @pytest.mark.parametrize("name", ["a.c3d", "a.trc", "a.toml", "participants.tsv"])
 def test_a_disk_that_fails(tmp_path, monkeypatch, name):
     path = tmp_path / name

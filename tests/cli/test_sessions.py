@@ -14,9 +14,9 @@ from bsip_cli.report.words import labelled, task_of, trial_label
 from bsip_cli.running.runner import perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.study.study import Study, Trial, load_study
+from tests.small_study import small
 
 ROLES = {"static": ("static",), "sequence": ("sequence",)}
 
@@ -124,10 +124,7 @@ def performed(root: Path, out: Path) -> Study:
 def test_sessions_change_no_number(tmp_path):
     """One body and one skeleton, whichever sessions the recordings are of."""
     root = tmp_path / "study"
-    tasks = {"static": 1.0, "sequence": 4.0}
-    rates = {"default": Rates(marker_hz=50, analog_hz=250)}
-    one = StudyOptions(1, seed=3, sexes="M", tasks=tuple(tasks), durations_s=tasks, rates=rates)
-    simulate_study(root, one)
+    simulate_study(root, small(static=1.0, sequence=4.0))
     performed(root, tmp_path / "flat")
     for stem, new in RENAMED.items():
         folder = root / "sub-01" / new.split("_")[1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,20 +16,13 @@ from bsip_cli.config import load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
-from bsip_cli.simulate.options import Laboratory, Rates, StudyOptions
+from bsip_cli.simulate.options import Laboratory
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.stages.person_mass import StatedMass, stated_mass
 from bsip_cli.study.study import load_study
+from tests.small_study import small
 
-OPTIONS = StudyOptions(
-    participants=1,
-    seed=11,
-    sexes="F",
-    tasks=("static", "squat"),
-    durations_s={"static": 1.5, "squat": 3.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    laboratory=Laboratory(plate_per_foot=True),
-)
+OPTIONS = replace(small("F", 11, static=1.5, squat=3.0), laboratory=Laboratory(plate_per_foot=True))
 STATIC, SQUAT = "sub-01_task-static", "sub-01_task-squat_run-1"
 CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 

@@ -167,9 +167,6 @@ def _placed(middle: np.ndarray, waist: np.ndarray, right: np.ndarray) -> dict[st
     }
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
 _LJC = with_other({"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)})
 # Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].

@@ -26,9 +26,6 @@ def rigid_motion(reference: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray,
     return turn, b - turn @ a
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 # A marker trusted to 5 mm leaves the turn about an axis so near uncertain by a quarter radian.
 _LEVER_M = 0.02
 

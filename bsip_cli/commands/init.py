@@ -138,9 +138,6 @@ def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMar
     return StudyMarkers(STARTER, starter_toml(guess.marker_set, guess.unknown, *named_in), (note,))
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
 
 

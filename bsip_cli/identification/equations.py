@@ -46,9 +46,6 @@ class Instruments:
         return out
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
 

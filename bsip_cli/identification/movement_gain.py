@@ -152,9 +152,6 @@ def _standing_on(
     return placed
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 _ADVISED = 3
 _STRIDE = 2  # frames; squares of 2.2 Hz need 9 Hz
 

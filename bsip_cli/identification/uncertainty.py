@@ -120,9 +120,6 @@ def in_words(share: np.ndarray) -> str:
     return ", ".join(words)
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class ReadableParameters:
     """Per segment (n, 10): mass, centre of mass and tensor about it in the segment frame.

@@ -238,9 +238,6 @@ def _leaves_its_place(residual: np.ndarray, level: np.ndarray, least: int) -> in
     return int(seen[split]) if in_place else 0
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 Kind = Literal["jump", "slip", "swap", "offset"]
 
 _ORDER: tuple[Kind, ...] = ("swap", "offset", "slip", "jump")

@@ -386,9 +386,6 @@ def block_means(x: np.ndarray, frames: int) -> np.ndarray:
     return np.where(2 * number >= frames, total / np.maximum(number, 1), np.nan)
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What is wrong with the markers of one trial.

@@ -64,9 +64,6 @@ def skin_corner_hz(
     return float((level / white_m**2) ** 0.25)
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 # Winter: a dual-pass second-order filter has its -3 dB point lower by this factor.
 _DUAL_PASS = 0.802
 _NOISE_FRAMES = 12

@@ -123,9 +123,6 @@ def lilliefors_test(x: ArrayLike) -> TestResult:
     return TestResult(n=n, statistic=float(statistic), p_value=float(p_value))
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 ROUNDING = 1e-12
 """Differences below this part of the largest value are rounding, not variation."""
 

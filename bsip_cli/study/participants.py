@@ -174,9 +174,6 @@ def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
     return Columns(known, tuple(faults)), []
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 NAME = re.compile(r"sub-[A-Za-z0-9]+")
 UNKNOWN = ("", "n/a", "na", "-", "?")
 

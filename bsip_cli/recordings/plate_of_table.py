@@ -116,9 +116,7 @@ class ForceOnPoint:
     def in_place_of(self, other: PlateSource) -> ForceOnPoint:
         assert isinstance(other, ForceOnPoint)
         known = self.known & other.known
-        return replace(
-            other, name=self.name, force_N=self.force_N, moment=self.moment, known=known
-        )
+        return replace(other, name=self.name, force_N=self.force_N, moment=self.moment, known=known)
 
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return self.point_height * reading.point_scale

@@ -38,6 +38,7 @@ _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wre
 # Those whose sizes are compared, and the usual one, logarithm: the spin of the segments about their
 # own centres is not in the motion.
 _SIZES = {"force": ([0, 1], 0.0), "lift": ([2], 0.0), "level": ([3, 4], 0.26)}
+_LIFT = list(_SIZES).index("lift")
 # Of the way from a segment's markers, which mark its lower joint or the top of the trunk, to those
 # of the segment that it hangs on: about there is its centre of mass.
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {
@@ -183,9 +184,16 @@ class Balance:
         one as much."""
         if self.correlations is None:
             return 0.0
-        close = np.clip(list(self.correlations.values()), -_CLOSEST, _CLOSEST)
         axes = np.array([len(_KINDS[kind]) for kind in self.correlations])
-        return float(-0.5 * self.numbers * np.sum(axes * np.sign(close) * np.log(1.0 - close**2)))
+        return float(axes @ self._rising(list(self.correlations.values())))
+
+    def lift_log_likelihood(self) -> float:
+        """The same of the vertical force alone."""
+        return float(sum(self._rising([alike for _, alike in self.sizes[_LIFT : _LIFT + 1]])))
+
+    def _rising(self, correlations: Sequence[float]) -> np.ndarray:
+        close = np.clip(correlations, -_CLOSEST, _CLOSEST)
+        return np.asarray(-0.5 * self.numbers * np.sign(close) * np.log(1.0 - close**2))
 
     def size_log_likelihood(self, times: float = 1.0) -> float:
         """That forces are as large as they need be if the body moves so many times as fast,

@@ -37,22 +37,34 @@ PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How well forces go with the body if they are taken from later, logarithm, (n,) each."""
+    """How well forces go with the body if they are taken from later, logarithm, (n,) each; of the
+    lift alone, how corners, axes and moments are read does not matter."""
 
     seconds: np.ndarray
     log_likelihood: np.ndarray
+    of_lift: np.ndarray
 
     def delay_s(self, limits: GateLimits) -> float:
-        """Of the forces after the body, 0 where that is not sure or as small as others find."""
-        best = int(np.argmax(self.log_likelihood))
+        """Of the forces after the body, 0 where that is not sure or as small as others find; by the
+        lift where the whole is no better."""
         is_large = np.abs(self.seconds) > LEAST_S
-        logs = self.log_likelihood + is_large * (DELAYED - np.log(len(self.seconds)))
+        if self.log_likelihood.max() < self.of_lift.max():
+            # What carries and drives the body is still to confirm it: no prior is taken off twice.
+            return self._peak_s(self.of_lift, is_large, 0.0, limits)
+        rarely = DELAYED - float(np.log(len(self.seconds)))
+        return self._peak_s(self.log_likelihood, is_large, rarely, limits)
+
+    def _peak_s(
+        self, log_likelihood: np.ndarray, is_large: np.ndarray, rarely: float, limits: GateLimits
+    ) -> float:
+        best = int(np.argmax(log_likelihood))
+        logs = log_likelihood + is_large * rarely
         near = np.abs(self.seconds - self.seconds[best]) <= _NEAR_S
         surely = np.exp(logsumexp(logs[near]) - logsumexp([*logs, 0.0]))
         is_inside = 0 < best < len(self.seconds) - 1
         if not (is_large[best] and is_inside and surely >= limits.corrected_percent / 100):
             return 0.0
-        before, here, after = self.log_likelihood[best - 1 : best + 2]  # of a parabola
+        before, here, after = log_likelihood[best - 1 : best + 2]  # of a parabola
         bend = 2.0 * here - before - after
         aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
         return float(self.seconds[best] + aside * (self.seconds[best + 1] - self.seconds[best]))
@@ -77,15 +89,16 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     most, near = (round(seconds * rate_hz / step) for seconds in (_MOST_S, 2 * _NEAR_S))
     most = min(most, len(frames))
     rough = {k: _goes(body, total, k, limits) for k in range(-2 * (most // 2), most + 1, 2)}
-    best = max(rough, key=lambda k: rough[k])
-    fine = {*range(-near, near + 1), *range(best - near, best + near + 1)} - rough.keys()
+    peaks = [0, *(max(rough, key=lambda k: rough[k][which]) for which in (0, 1))]
+    fine = {k for peak in peaks for k in range(peak - near, peak + near + 1)} - rough.keys()
     found = dict(sorted({**rough, **{k: _goes(body, total, k, limits) for k in fine}}.items()))
     seconds = np.array(list(found)) * step / rate_hz
-    return Lags(seconds, np.array(list(found.values())))
+    return Lags(seconds, *np.array(list(found.values())).T)
 
 
-def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> float:
-    return Balance.of(body, _shifted(total, by), limits).log_likelihood(limits)
+def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, float]:
+    balance = Balance.of(body, _shifted(total, by), limits)
+    return balance.log_likelihood(limits), balance.lift_log_likelihood()
 
 
 def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:

@@ -68,6 +68,12 @@ def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, .
     return tuple(loads)
 
 
+def bears_alone(plate: PlateLoad, plates: Sequence[PlateLoad]) -> np.ndarray:
+    """Frames in which no other plate is touched, (n_frames,) bool."""
+    others = [np.abs(one.force_z_N) < TOUCHED_N for one in plates if one is not plate]
+    return np.logical_and.reduce([plate.usable, *others])
+
+
 @dataclass(frozen=True, eq=False)
 class FootContacts:
     """What the feet's markers say of the contacts, whatever the person's mass."""

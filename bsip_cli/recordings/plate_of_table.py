@@ -11,7 +11,7 @@ import numpy as np
 from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.plate_reading import AS_STATED, PlateReading, Reference, faults_of_channels
 from bsip_cli.recordings.plate_source import PlateSource, averaged, in_lab, later_samples
-from bsip_cli.recordings.plates import CHANNELS, crossing
+from bsip_cli.recordings.plates import CHANNELS, LOADED_N, crossing
 
 _LEVEL = 0.5  # sine of an axis' slope
 _HARDLY = 0.05  # of a bell: less of it has points
@@ -22,7 +22,8 @@ _STILL_M = 1e-6  # points that stay where they are, are no centres of pressure
 class ForceOnPoint:
     """A force of a table (MOT), with the points that it acts on and moments, both as written.
 
-    All (n, 3), lab frame; a point is zero where there is no force.
+    All (n, 3), lab frame; a point is zero where there is no force. known : (n,) bool, samples of
+    force, moment and point that can be believed.
     """
 
     name: str
@@ -31,8 +32,20 @@ class ForceOnPoint:
     moment: np.ndarray
     point_height: float  # median under load, in the points' unit
     points_move: bool
-    usable: np.ndarray  # (n,) bool
+    known: np.ndarray
     rotation_world_lab: np.ndarray  # (3, 3)
+
+    @property
+    def usable(self) -> np.ndarray:
+        """Known, and not a load without a point."""
+        return self.known & ~self.pointless()
+
+    def pointless(self) -> np.ndarray:
+        """Loaded, and without the point that other loads have, (n,) bool."""
+        if self.points is None or not self.points_move:
+            return np.zeros(len(self.known), bool)
+        loaded = np.linalg.norm(np.nan_to_num(self.force_N), axis=1) > LOADED_N
+        return loaded & ~self.points.any(axis=1)
 
     def parts(self) -> np.ndarray:
         """Force, moment, and the products of each coordinate of the point with each force."""
@@ -58,13 +71,13 @@ class ForceOnPoint:
             force_N=self.force_N[samples],
             points=None if self.points is None else self.points[samples],
             moment=self.moment[samples],
-            usable=self.usable[samples],
+            known=self.known[samples],
         )
 
     def later(self, by: int) -> ForceOnPoint:
         samples, there = later_samples(len(self.usable), by)
         part = self.at(samples)
-        return replace(part, usable=part.usable & there)
+        return replace(part, known=part.known & there)
 
     def smoothed(self, sigma: float) -> ForceOnPoint:
         """Points where there are any: zero says that there is no force."""
@@ -102,7 +115,8 @@ class ForceOnPoint:
 
     def in_place_of(self, other: PlateSource) -> ForceOnPoint:
         assert isinstance(other, ForceOnPoint)
-        return replace(other, name=self.name, force_N=self.force_N, moment=self.moment)
+        known = self.known & other.known
+        return replace(other, name=self.name, force_N=self.force_N, moment=self.moment, known=known)
 
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return self.point_height * reading.point_scale
@@ -130,7 +144,11 @@ class ForceOnPoint:
             yield PlateReading(channels=fault, about=about)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
-        return []
+        if not (pointless := self.pointless()).any():
+            return []
+        found = f"{pointless.sum()} of {len(pointless)} samples have a force and no point"
+        action = "marked them unusable"
+        return [Finding("analog_point", self.name, found, "none", action, "warning")]
 
     @staticmethod
     def with_centre(trials: Sequence[ForceOnPoint], reading: PlateReading) -> PlateReading:

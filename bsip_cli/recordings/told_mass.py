@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
-from bsip_cli.stated import BMI_KG_M2
+from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
 # (makers' data sheets), 0.27 % between equator and poles for gravity.
@@ -35,6 +35,7 @@ _UNITS = (
 )
 # What forces were written in, that were read in newton: newton over the unit.
 _FORCE_UNITS = (("pounds-force", 4.44822), ("kilogram-force", 9.80665))
+_IN_UNIT = "the forces are likely to be in another unit, {}: export them in N"
 _CM_PER_M = 100.0
 _NEAR_CM = 3.0
 
@@ -44,6 +45,7 @@ class ToldMass:
     """What the plates tell: mass [kg] with its relative standard deviation, or why none.
 
     mass_kg is NaN where ``reason`` says why it is not known; ``remark`` is what else is to be said.
+    of_nobody : it would be known, and is no person's.
     """
 
     mass_kg: float
@@ -52,6 +54,7 @@ class ToldMass:
     stretches: int
     reason: str = ""
     remark: str = ""
+    of_nobody: bool = False
 
     @property
     def is_known(self) -> bool:
@@ -186,10 +189,55 @@ def _judged(
     low, high = (LEAST_KG, MOST_KG) if height_m is None else np.array(BMI_KG_M2) * height_m**2
     if not low <= told.mass_kg <= high:
         stature = "" if height_m is None else f" of {height_m:.2f} m"
-        return unknown(
-            f"the plates tell {told.mass_kg:.1f} kg, a person{stature} has {low:.0f} to {high:.0f}"
-        )
+        reason = f"the plates tell {told.mass_kg:.1f} kg, a person{stature} has {low:.0f} to "
+        reason += f"{high:.0f}{_likely_unit(told.mass_kg, height_m)}"
+        return replace(unknown(reason), of_nobody=True)
     return told
+
+
+def _likely_unit(mass_kg: float, height_m: float | None) -> str:
+    """Of forces that were read in newton and so tell a mass that nobody of this stature has."""
+    if height_m is None:
+        return ""
+    low, high = np.array(USUAL_BMI_KG_M2) * height_m**2
+    units = [name for name, newton in _FORCE_UNITS if low <= newton * mass_kg <= high]
+    return f"; {_IN_UNIT.format(units[0])}" if len(units) == 1 else ""
+
+
+def plates_apart(
+    plates: Mapping[str, Sequence[Stretch]], person_kg: float | None, apart_percent: float
+) -> list[Finding]:
+    """A warning for each plate that, while it bears the person alone, tells another mass than
+    another plate does, and than ``person_kg`` if that is stated.
+
+    plates : stretches by the plate that bears all. apart_percent : what may differ beside the
+    intervals.
+    """
+    told = {name: told_mass({name: some}, _PERCENT) for name, some in plates.items()}
+    told = {name: one for name, one in told.items() if one.is_known}
+    findings = []
+    for name, one in told.items():
+        others = {k: two for k, two in told.items() if _are_apart(one, two, apart_percent)}
+        known = person_kg is not None and not _are_apart(
+            one, replace(one, mass_kg=person_kg, sd=0.0), apart_percent
+        )
+        if not others or known:
+            continue
+        beside = " and ".join(f"{two.mass_kg:.1f} kg on plate {k}" for k, two in others.items())
+        found = f"its vertical force tells {one.mass_kg:.1f} kg while it bears the person alone, "
+        found += f"and {beside}"
+        expected = "one weight on every plate"
+        expected += "" if person_kg is None else f", the stated {person_kg:.1f} kg"
+        action = "took it as it stands; look at this plate's gain, and whether something else "
+        action += "bears the person there"
+        findings.append(Finding("plate_force", name, found, expected, action, "warning"))
+    return findings
+
+
+def _are_apart(one: ToldMass, other: ToldMass, percent: float) -> bool:
+    ratio = one.mass_kg / other.mass_kg
+    apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
+    return apart > percent + one.half_width_percent + other.half_width_percent
 
 
 # --- a stated mass --------------------------------------------------------------------------------
@@ -243,7 +291,7 @@ class Comparison:
     def _likely_forces(self) -> str:
         for name, newton in _FORCE_UNITS:
             if self._meets(self.stated_kg / newton):
-                return f"the forces are likely to be in {name}: export them in N"
+                return _IN_UNIT.format(name)
         return ""
 
     def _meets(self, mass_kg: float) -> bool:
@@ -251,29 +299,33 @@ class Comparison:
         return abs(_PERCENT * ((mass_kg + self.load_kg) / self.told.mass_kg - 1.0)) <= allowed
 
     def sentence(self, where: str) -> str:
-        """Of a gross difference: both numbers, what is likely, what to do."""
-        likely = (
-            self.likely()
-            or self._likely_forces()
-            or ("a typing mistake, another person's row, a second person or a load on the plates")
-        )
+        """Of a difference: both numbers; what is likely, where it is gross."""
+        remark = f" ({self.difference_percent:+.1f} %)"
+        if self.is_gross:
+            nothing_known = "a typing mistake, another person's row, a second person or a load on "
+            likely = self.likely() or self._likely_forces() or f"{nothing_known}the plates"
+            remark = f"; {likely}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
-            f"the plates tell {self.told.words()}; {likely}"
+            f"the plates tell {self.told.words()}{remark}"
         )
 
 
 def mass_finding(told: ToldMass, comparison: Comparison | None, where: str) -> Finding:
     """The line for the quality table of a trial."""
+    if told.of_nobody:
+        return Finding("mass", "", told.reason, "a person", "left it open", "warning")
     if not told.is_known:
         expected, action = "a mass that the plates tell for sure", "nothing compared"
         return Finding("plate_mass", "", f"not known: {told.reason}", expected, action, "info")
     if comparison is None:
         return Finding("plate_mass", "", told.words(), "no mass is stated", "", "info")
-    expected = f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
     if comparison.is_gross:
         action = "contacts found with the plates' mass"
         return Finding("mass", "", comparison.sentence(where), "", action, "warning")
-    level = "info" if comparison.is_small else "warning"
-    action = f"left both as they are ({comparison.difference_percent:+.1f} %)"
-    return Finding("plate_mass", "", told.words(), expected, action, level)
+    expected = f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
+    if comparison.is_small:
+        found, level = told.words(), "info"
+    else:
+        found, level = comparison.sentence(where), "warning"
+    return Finding("plate_mass", "", found, expected, "left both as they are", level)

@@ -199,18 +199,19 @@ def _source(
         moment=next(columns, np.zeros((len(rows), 3))),  # without columns: no free torque, and said
         point_height=float(np.nanmedian(height)) if len(height) else 0.0,
         points_move=point is not None and points_that_move(point, loaded),
-        usable=~missing,
+        known=~missing,
         rotation_world_lab=rotation,
     )
     wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
-    samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
+    written = np.hstack([source.force_N, source.moment])
+    samples = check_samples(wrench, written, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
     samples = replace(samples, not_a_number=missing, silent_channels=())  # no column, or no torque
     expected = (
         f"forces as long as the markers, {markers.span()} s (the file "
         f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
     )
     none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
-    return replace(source, usable=samples.usable()), [
+    return replace(source, known=samples.usable()), [
         replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
         for one in sample_findings(force.name, samples, grid.rate_hz)
     ]

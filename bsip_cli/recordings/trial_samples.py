@@ -97,7 +97,8 @@ class TrialSamples:
 
 
 def _delay_s(opened: Opened, hands: Handedness, limits: GateLimits) -> float:
-    """Of the forces after the body; in other axes where none makes them go together as stated."""
+    """Of the forces after the body; in other axes where none makes them go together as stated, and
+    by the lift where these do not either."""
     best = lags(opened, limits)
     if best is None:
         return 0.0

@@ -15,6 +15,7 @@ from bsip_cli.recordings.contacts import (
     ContactWindows,
     PlateLoad,
     agreeing_mass,
+    bears_alone,
     contact_windows,
     foot_contacts,
     plate_loads,
@@ -26,7 +27,7 @@ from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.told_mass import mass_finding, told_mass
+from bsip_cli.recordings.told_mass import mass_finding, plates_apart, told_mass
 from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
@@ -160,6 +161,12 @@ def _contacts(
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
     stretches = stretches_of(markers, feet.total_N, shown, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, stretches)
+    alone = {
+        load.name: stretches_of(markers, load.force_z_N, shown & bears_alone(load, loads), rate_hz)
+        for load in loads
+    }
+    stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
+    about_mass += plates_apart(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
@@ -176,7 +183,8 @@ def _mass_on_plates(
     stated mass what they tell for sure; else None.
     """
     options = unit.config.ingest
-    told = told_mass({unit.name: stretches}, options.mass_half_width_percent)
+    height_m = unit.person.height_m if stated is None else None
+    told = told_mass({unit.name: stretches}, options.mass_half_width_percent, height_m)
     if stated is not None and not told.is_known:
         told = told_mass({unit.name: stretches}, VAGUE_PERCENT)
     comparison = compared(unit, stated, told, unit.load_kg())

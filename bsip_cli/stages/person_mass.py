@@ -76,7 +76,7 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
         note = f"mass is not known: put mass_kg into participants.tsv, because {told.reason}"
         unit.say(note)
         return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
-    vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, height_m, static)
+    vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, static=static)
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
         unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")

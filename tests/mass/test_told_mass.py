@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.recordings.told_mass import told_mass
+from bsip_cli.recordings.told_mass import mass_finding, plates_apart, told_mass
 from tests.mass.body import told
 
 
@@ -49,3 +49,32 @@ def test_an_interval_that_is_too_wide_is_no_mass():
 
 def test_no_trial_with_forces_is_said():
     assert "no trial" in told_mass({}, 10.0).reason
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "unit"),
+    [(70 / 4.44822, "pounds-force"), (70 / 9.80665, "kilogram-force"), (30, "")],
+)
+def test_a_mass_that_is_nobodys_is_said_with_the_likely_unit(mass_kg, unit):
+    finding = mass_finding(told_mass({"a": told(mass_kg)}, 10.0, 1.70), None, "")
+    assert finding.level == "warning" and "a person of 1.70 m has 35 to 173" in finding.found
+    assert unit in finding.found and ("likely" in finding.found) == bool(unit)
+
+
+@pytest.mark.parametrize(
+    ("masses_kg", "stated_kg", "odd"),
+    [
+        ((62.0, 61.0), None, []),
+        ((62.0, 31.0), None, ["1", "2"]),
+        ((62.0, 31.0), 61.0, ["2"]),
+        ((31.0, 31.0), 62.0, []),  # all alike: that is said of the stated mass
+        ((62.0, 74.0, 62.0), 62.0, ["2"]),
+    ],
+)
+def test_a_plate_that_tells_another_mass_than_the_others_is_named(masses_kg, stated_kg, odd):
+    plates = {str(k + 1): told(kg) for k, kg in enumerate(masses_kg)}
+    findings = plates_apart(plates, stated_kg, 15.0)
+    assert [one.subject for one in findings] == odd
+    for one in findings:
+        mass_kg = masses_kg[int(one.subject) - 1]
+        assert one.level == "warning" and f"tells {mass_kg:.1f} kg" in one.found

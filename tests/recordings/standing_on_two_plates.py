@@ -86,7 +86,7 @@ def of_table(about: str = "stated", point_scale: float = 1.0, moment_scale: floa
                 moment=(free_moment(force) + np.cross(arm, force)) * moment_scale,
                 point_height=0.0,
                 points_move=points_that_move(point, force[:, 2] > 100),
-                usable=np.ones(N, bool),
+                known=np.ones(N, bool),
                 rotation_world_lab=np.eye(3),
             )
         )

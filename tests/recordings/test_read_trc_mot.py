@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from tests.recordings.recording_writers import (
     write_mot,
     write_trc,
 )
+from tests.recordings.standing_on_two_plates import of_table
 
 N = 80
 TURN = Y_UP_FROM_Z_UP.T
@@ -322,3 +325,35 @@ def test_a_missing_point_is_the_nearest_known_one_under_a_light_force_only(tmp_p
     assert plate.usable[lifted].all()
     held = [49] * 5 + [60] * 5
     np.testing.assert_allclose(plate.cop_m(0.0)[lifted], plate.cop_m(0.0)[held], atol=1e-9)
+
+
+def test_a_load_without_a_point_is_marked_and_said(tmp_path):
+    markers, labels = standing_markers(N)
+    time_s, (force, moment) = np.arange(N) / 100.0, standing_wrench(N)
+    columns = _columns(force, moment)
+    for axis in "xyz":
+        columns[f"ground_force_1_p{axis}"][50:60] = 0.0
+    write_trc(tmp_path / "a.trc", time_s, markers @ TURN, labels)
+    write_mot(tmp_path / "a.mot", time_s, columns)
+    recording = read_recording(tmp_path / "a.trc")
+    (plate,) = recording.plates
+    assert np.flatnonzero(~plate.usable).tolist() == list(range(50, 60))
+    assert any(
+        f"10 of {N} samples have a force and no point" in f.found for f in recording.findings
+    )
+
+
+def test_exchanged_points_are_no_missing_ones():
+    """Points are zero while their own plate bears nothing, which is while the other one does."""
+    first, second = of_table()
+    half = np.arange(len(first.known)) < len(first.known) // 2
+    bears = (half, ~half)
+    first, second = (
+        replace(one, force_N=one.force_N * on[:, None], points=one.points * on[:, None])
+        for one, on in zip((first, second), bears, strict=True)
+    )
+    wrong = replace(first, points=second.points), replace(second, points=first.points)
+    assert not any(one.usable[on].any() for one, on in zip(wrong, bears, strict=True))
+    right = wrong[0].in_place_of(wrong[1]), wrong[1].in_place_of(wrong[0])
+    assert all(one.usable.all() for one in right)
+    np.testing.assert_array_equal(right[0].points, first.points)

@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, freqs, sosfiltfilt
 
-from bsip_cli.diagnosis.error_terms import WANDER_M, smoothing_bias, wander
+from bsip_cli.diagnosis.error_terms import (
+    SKIN_DAMPING,
+    SKIN_HZ,
+    WANDER_M,
+    smoothing_bias,
+    stays_behind,
+    wander,
+)
 from tests.effects.moving_scene import moving
 
 
@@ -27,3 +34,15 @@ def test_the_bias_tells_what_a_low_pass_takes():
     lost = scene.predicted[:, 2] - sosfiltfilt(sections, scene.predicted[:, 2])
     inner = slice(60, -60)
     assert np.corrcoef(force[inner], lost[inner])[0, 1] == pytest.approx(1.0, abs=0.2)
+
+
+def test_tissue_stays_behind_as_what_hangs_on_a_spring_and_a_damper_does():
+    """In size and in lateness, of a pace below its own."""
+    rate_hz, own = 1000.0, 2 * np.pi * SKIN_HZ
+    times_s = np.arange(0, 4, 1 / rate_hz)
+    for hz in (1.0, 2.0):
+        pace = 2 * np.pi * hz
+        exact = freqs([-1.0], [1.0, 2 * SKIN_DAMPING * own, own**2], [pace])[1][0]
+        course = stays_behind(np.cos(pace * times_s), rate_hz)[1:-1]
+        expected = (exact * np.exp(1j * pace * times_s)).real[1:-1]
+        np.testing.assert_allclose(course, expected, atol=0.03 * np.abs(expected).max())

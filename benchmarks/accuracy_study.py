@@ -12,9 +12,15 @@ from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import PRESETS
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan, add_breath_of_motion, add_sway, plate_under, sketch_for
-from bsip_cli.simulate.recording import measure_trial, write_trial
+from bsip_cli.simulate.recording import (
+    THIN,
+    Trial,
+    measure_trial,
+    simulate_trial,
+    trial_of,
+    write_trial,
+)
 from bsip_cli.simulate.study import participant_person, simulate_study
-from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 
 POOR_S = 10.0
 SQUATS, ONE_ARM = "squats", "onearm"
@@ -68,7 +74,7 @@ def one_arm_plan(person: Person, rng: np.random.Generator) -> Plan:
     sketch.angles["shoulder_r"] += RAISED_RAD * swing[:, None]
     sketch.angles["elbow_r"] += BENT_RAD * swing
     add_breath_of_motion(sketch, rng, np.deg2rad(0.2))
-    add_sway(sketch, rng)
+    add_sway(sketch, rng, 1.0)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng))
 
 

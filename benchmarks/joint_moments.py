@@ -25,8 +25,8 @@ from bsip_cli.simulate.movements import DEFAULT_DURATION_S
 from bsip_cli.simulate.numerics import derivative
 from bsip_cli.simulate.options import PRESETS, StudyOptions
 from bsip_cli.simulate.plan import GRAVITY
+from bsip_cli.simulate.recording import Trial, simulate_trial
 from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
-from bsip_cli.simulate.trial import Trial, simulate_trial
 
 STEP_S = 1e-3
 SIGMA_S = np.sqrt(np.log(2)) / (2 * np.pi * 10.0)  # of joints.cutoff_hz, half of the power

@@ -37,8 +37,14 @@ from bsip_cli.simulate.plan import (
     plate_under,
     sketch_for,
 )
-from bsip_cli.simulate.recording import measure_trial, write_trial
-from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
+from bsip_cli.simulate.recording import (
+    THIN,
+    Trial,
+    measure_trial,
+    simulate_trial,
+    trial_of,
+    write_trial,
+)
 from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study
 

@@ -28,7 +28,7 @@ _SHAPE = {
     "provenance": {"made_by": _MADE_BY, "messages": [str], "facts": dict},
 }
 
-_UNFINISHED = ".bsip-part"
+_UNFINISHED, _NOTES = ".bsip-part", ("unit", "frame", "meaning")
 
 Rows = pd.DataFrame | Sequence[Mapping[str, Any]]
 """A table, or its rows."""
@@ -81,7 +81,7 @@ def write_artifact_in_parts(
     provenance : asked for when the last part is written.
     """
     layout = SCHEMAS[kind]
-    schema = pa.schema(_fields(layout, [column.name for column in layout.columns]))
+    schema = pa.schema(_fields(layout, column_names(kind)))
     tables = (_to_arrow(layout, part[schema.names]) for part in parts)
 
     def write(temporary: Path) -> None:
@@ -106,8 +106,7 @@ def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> 
 
 
 def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
-    for k in range(file.num_row_groups):
-        yield file.read_row_group(k)
+    return map(file.read_row_group, range(file.num_row_groups))
 
 
 def write_atomically(path: Path, write) -> None:
@@ -297,13 +296,11 @@ def _to_arrow(schema: Schema, rows: Rows) -> pa.Table:
 
 
 def _fields(schema: Schema, names: list[str]) -> list[pa.Field]:
-    fields = []
-    for name in names:
-        column = schema.column(name)
-        assert column is not None
-        notes = {"unit": column.unit, "frame": column.frame, "meaning": column.meaning}
-        fields.append(pa.field(name, _TYPES[column.type], metadata=notes))
-    return fields
+    known = ((name, column) for name in names if (column := schema.column(name)))
+    return [
+        pa.field(name, _TYPES[c.type], metadata={k: getattr(c, k) for k in _NOTES})
+        for name, c in known
+    ]
 
 
 def _header(schema: Schema, provenance: Mapping) -> dict[str, str]:

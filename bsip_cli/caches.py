@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,30 +14,20 @@ from pathlib import Path
 def cache_home() -> Path | None:
     """The user's cache folder; where it cannot be written to, one of theirs among temporary files.
 
-    Code that is run lies there, so a folder that another user owns or may write to is not taken.
-    None: there is no safe one.
+    As the XDG base directory specification says (a relative path is to be ignored). Code that is
+    run lies there, so a folder that another user owns or may write to is not taken, nor one in a
+    folder where others may rename it (no sticky bit). None: there is no safe one.
     """
-    return next((folder for folder in (_own(), _temporary()) if folder and _is_ours(folder)), None)
-
-
-def _own() -> Path | None:
-    """As the XDG base directory specification says; a relative path is to be ignored."""
-    try:
+    folders = []
+    with suppress(OSError, RuntimeError):  # a user without a home, a circle of links
         home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        return home.resolve() if home.is_absolute() else None
-    except (OSError, RuntimeError):  # a user whom the system knows no home of, a circle of links
-        return None
-
-
-def _temporary() -> Path | None:
-    """One per user; in a folder where others may rename it (no sticky bit) it would not be safe."""
-    try:
+        folders += [home.resolve()] if home.is_absolute() else []
+    with suppress(OSError):  # no folder for temporary files
         parent = Path(tempfile.gettempdir())
         mode = parent.stat().st_mode
-    except OSError:  # no folder for temporary files
-        return None
-    safe = mode & stat.S_ISVTX or not mode & stat.S_IWOTH
-    return parent / f"bsip-cache-{os.geteuid()}" if safe else None
+        safe = mode & stat.S_ISVTX or not mode & stat.S_IWOTH
+        folders += [parent / f"bsip-cache-{os.geteuid()}"] if safe else []
+    return next(filter(_is_ours, folders), None)
 
 
 def _is_ours(folder: Path) -> bool:

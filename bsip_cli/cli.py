@@ -178,9 +178,9 @@ def markers(**asked):
     written is there; 3 the recording cannot be read, no set fits, or markers are missing that a
     skeleton cannot do without.
     """
-    from bsip_cli.commands.markers import Request, markers_command
+    from bsip_cli.commands.markers import markers_command
 
-    return markers_command(Request(**asked))
+    return markers_command(**asked)
 
 
 @cli.command()
@@ -197,9 +197,9 @@ def init(**asked):
     Exit codes: 0 done; 2 usage, or the study's folder is not empty; 3 a recording cannot be used
     (the others are).
     """
-    from bsip_cli.commands.init import Request, init_command
+    from bsip_cli.commands.init import init_command
 
-    return init_command(Request(**asked))
+    return init_command(**asked)
 
 
 @cli.command("compare-loads")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -193,8 +193,8 @@ class Config(Section):
         return {name: everything[name] for name in names}
 
 
-def load_config(files: Iterable[Path]) -> Config:
-    """Defaults, then each file that is there in turn.
+def load_config(files: Iterable[Path], estimators: Sequence[str] = ()) -> Config:
+    """Defaults, then each file that is there in turn; other estimators, in order, where given.
 
     Raises
     ------
@@ -202,7 +202,9 @@ def load_config(files: Iterable[Path]) -> Config:
         A file is not TOML, or holds unknown options or values out of range: all named at once.
     """
     there = [file for file in files if os.path.lexists(file)]
-    return config_of(*map(read_toml, there), file=", ".join(map(str, there)))
+    other = {"identify": {"estimators": list(dict.fromkeys(estimators))}} if estimators else {}
+    sources = [*map(str, there), *(["--estimator"] if other else [])]
+    return config_of(*map(read_toml, there), other, file=", ".join(sources))
 
 
 def config_of(*given: Mapping, file: str = "the options") -> Config:
@@ -217,7 +219,8 @@ def config_of(*given: Mapping, file: str = "the options") -> Config:
     for options in given:
         merged = _merge(merged, options)
     try:
-        return Config.model_validate_json(json.dumps(merged, default=_date), strict=True)
+        text = json.dumps(merged, default=lambda date: {"date": str(date)})  # no option takes that
+        return Config.model_validate_json(text, strict=True)
     except ValidationError as error:
         faults = error.errors()
         more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
@@ -226,32 +229,6 @@ def config_of(*given: Mapping, file: str = "the options") -> Config:
             file=file,
             remedy="configs/default.toml lists every option with its unit",
         ) from None
-
-
-def with_estimators(config: Config, names: tuple[str, ...]) -> Config:
-    """The configuration with other estimators, in order; unchanged without names.
-
-    Raises
-    ------
-    UsageError
-        A name is no estimator.
-    """
-    if not names:
-        return config
-    values = config.model_dump()
-    values["identify"]["estimators"] = tuple(dict.fromkeys(names))
-    try:
-        return Config.model_validate(values)
-    except ValidationError as error:
-        raise UsageError(
-            "; ".join(_fault(e) for e in error.errors() if len(e["loc"]) > 2),
-            remedy="check --estimator",
-        ) from None
-
-
-def _date(value: object) -> dict:
-    """What JSON lacks, as what no option takes."""
-    return {"date": str(value)}
 
 
 def _merge(base: Mapping, over: Mapping) -> dict:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 
 def printable(text: str) -> str:
     """A text with a question mark for what is no letter, digit, sign or blank.
@@ -43,11 +45,8 @@ class BsipError(Exception):
         return printable(f"{where}{self.found}{expected}{remedy}.")
 
     def __reduce__(self):  # crosses process borders with its data
-        return _rebuild, (type(self), self.found, self.expected, self.remedy, self.file)
-
-
-def _rebuild(kind, found, expected, remedy, file):
-    return kind(found, expected=expected, remedy=remedy, file=file)
+        told = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
+        return partial(type(self), **told), (self.found,)
 
 
 class UsageError(BsipError):

@@ -14,7 +14,7 @@ Tables are those of the artifacts: docs/artifacts.md lists their columns, units 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +25,7 @@ import pandas as pd
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import Rows, as_read
-from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import load_skeleton
@@ -33,7 +33,8 @@ from bsip_cli.config import Config, config_of
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_source import C3dPlate, Opened
+from bsip_cli.recordings.plate_of_c3d import C3dPlate
+from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.plates import PlateDescription
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.running.unit import Unit
@@ -257,12 +258,12 @@ class Person:
 
     def _whole(self, stage: str, kind: str) -> pd.DataFrame:
         self._run(stage)
-        return self._kept[kind, ""].frame.copy()
+        return self.table(kind)
 
     def _by_trial(self, stage: str, kind: str) -> dict[str, pd.DataFrame]:
         self._run(stage)
-        found = ((name, self._kept.get((kind, stem))) for stem, name in self._names.items())
-        return {name: kept.frame.copy() for name, kept in found if kept is not None}
+        made = self._unit(producer(kind)).trials(kind)
+        return {self._names[one.stem]: self.table(kind, self._names[one.stem]) for one in made}
 
     def _run(self, last: str) -> None:
         """What a stage needs, and itself, once; a trial that is refused does not stop the others.
@@ -281,9 +282,13 @@ class Person:
             self._done.add(stage.label)
 
     def _do(self, unit: Unit) -> None:
-        if unit.missing():
+        if gone := unit.missing():
             if unit.trial is None:
-                raise self._why_not(unit)
+                raise next(iter(self.refused.values()), None) or BadDataError(
+                    f"{unit.stage.name} has no {', '.join(gone)} to read",
+                    file=unit.name,
+                    remedy="give the recordings that it needs",
+                )
             return
         try:
             import_module(unit.stage.module).run(unit)
@@ -296,35 +301,15 @@ class Person:
         finally:
             self.messages += unit.messages
 
-    def _why_not(self, unit: Unit) -> BsipError:
-        first = next(iter(self.refused.values()), None)
-        return first or BadDataError(
-            f"{unit.stage.name} has no {', '.join(unit.missing())} to read",
-            file=unit.name,
-            remedy="give the recordings that it needs",
-        )
-
-    def _unit(self, stage: Stage, trial: Trial | None) -> Unit:
-        return _InMemory(
-            stage,
-            self._study,
-            _NOWHERE,
-            self.config,
-            self._participant,
-            trial,
-            recordings=self._recordings,
-            kept=self._kept,
-        )
-
-
-def _stages_of(name: str) -> list[Stage]:
-    return [stage for stage in STAGES if stage.name == name and stage.level != "cohort"]
+    def _unit(self, stage: Stage, trial: Trial | None = None) -> Unit:
+        whole = self._study, _NOWHERE, self.config, self._participant
+        return _InMemory(stage, *whole, trial, recordings=self._recordings, kept=self._kept)
 
 
 def _needed(last: str) -> list[Stage]:
     """A stage and all that it reads from, in order."""
     needed: set[str] = set()
-    open_ = _stages_of(last)
+    open_ = [stage for stage in STAGES if stage.name == last and stage.level != "cohort"]
     while open_:
         stage = open_.pop()
         if stage.label not in needed:
@@ -349,29 +334,24 @@ class _InMemory(Unit):
     kept: dict[Key, _Kept] = field(default_factory=dict)
 
     def _key(self, kind: str, trial: Trial | None = None) -> Key:
-        of_trial = producer(kind).level == "trial"
         owner = trial or self.trial
-        return kind, owner.stem if of_trial and owner else ""
+        return kind, owner.stem if producer(kind).level == "trial" and owner else ""
 
-    def trials(self, *kinds: str) -> tuple[Trial, ...]:
-        assert self.participant is not None
-        every = self.participant.trials
-        return tuple(t for t in every if all(self._key(k, t) in self.kept for k in kinds))
-
-    def stands(self, kind: str, trial: Trial | None, participant: Participant) -> bool:
+    def stands(
+        self,
+        kind: str,
+        trial: Trial | None,
+        participant: Participant | None,
+        names: Collection[str] | None = None,
+    ) -> bool:
         return self._key(kind, trial) in self.kept
-
-    def _has(self, kind: str) -> bool:
-        if producer(kind).level == "trial" and self.trial is None:
-            return bool(self.trials(kind))
-        return self._key(kind) in self.kept
 
     def read(
         self,
         kind: str,
         trial: Trial | None = None,
         participant: Participant | None = None,
-        **wanted: Iterable[str],
+        **wanted: Collection[str],
     ) -> pd.DataFrame:
         frame = self.kept[self._key(kind, trial)].frame
         for column, values in wanted.items():
@@ -390,8 +370,7 @@ class _InMemory(Unit):
     def write_in_parts(
         self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
     ) -> None:
-        frame = pd.concat(list(parts), ignore_index=True)
-        self.write(kind, frame, facts())
+        self.write(kind, pd.concat(list(parts), ignore_index=True), facts())
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:
         before = self.kept[self._key(kind)]

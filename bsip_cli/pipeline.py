@@ -212,27 +212,29 @@ FINDINGS = ("choose", "diagnose", "laboratory", "extend", "report")
 
 _SHORT_S = 0.1
 _COSTS_S = {
-    "ingest participant": 6.0,
-    "ingest trial": 0.7,
-    "scale participant": 6.0,
-    "ik trial": 0.4,
-    "identify participant": 6.0,
-    "reconstruct trial": 0.4,
-    "laboratory participant": 13.0,
-    "laboratory cohort": 4.0,
-    "diagnose participant": 41.0,
+    "ingest participant": 5.0,
+    "ingest trial": 0.3,
+    "scale participant": 5.0,
+    "ik trial": 0.3,
+    "identify participant": 1.7,
+    "reconstruct trial": 0.2,
+    "laboratory participant": 5.0,
+    "laboratory cohort": 3.2,
+    "diagnose participant": 6.0,  # per trial
     "joints trial": 0.4,
-    "stats cohort": 4.5,
-    "report participant": 6.5,
-    "report cohort": 3.0,
+    "stats cohort": 2.3,
+    "report participant": 5.0,
+    "report cohort": 3.5,
 }
-"""Medians of a fresh run of the sample (`bsip run sample_data --jobs 2 -v`), which weigh the units
-in the bar of a run; all others take next to no time."""
+"""About the geometric means of CPU seconds of fresh runs of a person of the sample, a child (gait),
+squats and jumps (OpenCap) and golf swings, which weigh the units in the bar of a run: the time left
+is right within a factor of two in each. All other units take next to no time."""
 
 
-def cost_s(stage: str, level: str) -> float:
-    """About how long a unit takes beside others [s]."""
-    return _COSTS_S.get(f"{stage} {level}", _SHORT_S)
+def cost_s(stage: str, level: str, trials: int) -> float:
+    """About how long a unit, of a person with so many trials, takes beside others [s]."""
+    unit = f"{stage} {level}"
+    return _COSTS_S.get(unit, _SHORT_S) * (trials if unit == "diagnose participant" else 1)
 
 
 def stages_named(name: str) -> tuple[Stage, ...]:

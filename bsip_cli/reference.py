@@ -22,7 +22,6 @@ from pydantic.fields import FieldInfo
 from bsip_cli.cli import cli
 from bsip_cli.config import Config, Section, shipped
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.effect import Effect
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.report.effect_words import EFFECT_WORDS, USUAL, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Level, Schema
@@ -64,18 +63,25 @@ def _code(names: Iterable[str]) -> str:
 
 def cli_page() -> str:
     """Every command with its own options; those of several are explained once."""
-    lines = {name: _option_lines(command) for name, command in cli.commands.items()}
+    lines = {
+        name: [
+            f"- `{_spelling(one)}`: {one.help or ''}{_default(one)}"
+            for one in command.params
+            if isinstance(one, click.Option)
+        ]
+        for name, command in cli.commands.items()
+    }
     seen = Counter(line for each in lines.values() for line in each)
     common = [line for line, n in seen.items() if n > 1]
     parts = [_paragraphs(cli), "## Options of several commands", "\n".join(common)]
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, command in cli.commands.items():
-        groups.setdefault((_usage(command), *lines[name]), []).append(name)
-    for (usage, *options), names in groups.items():
+        usage = " ".join(command.collect_usage_pieces(click.Context(command, info_name=name)))
+        groups.setdefault((usage, *lines[name]), []).append(name)
+    for (pieces, *options), names in groups.items():
         own = [line for line in options if line not in common]
         shared = [line.split("`")[1].split()[0] for line in options if line in common]
-        heading = usage.replace("[OPTIONS] ", "")
-        parts += [f"## {', '.join(names)} {heading}", *_meanings(names)]
+        parts += [f"## {', '.join(names)} {pieces.replace('[OPTIONS] ', '')}", *_meanings(names)]
         parts += ["Options:"] if own and len(names) > 1 else []
         parts += ["\n".join(own)] if own else []
         parts += [f"{'And' if own else 'Options:'} {_code(shared)}."] if shared else []
@@ -91,16 +97,6 @@ def _meanings(names: Sequence[str]) -> list[str]:
 
 def _paragraphs(command: click.Command) -> str:
     return "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
-
-
-def _usage(command: click.Command) -> str:
-    context = click.Context(command, info_name=command.name)
-    return " ".join(command.collect_usage_pieces(context))
-
-
-def _option_lines(command: click.Command) -> list[str]:
-    options = [each for each in command.params if isinstance(each, click.Option)]
-    return [f"- `{_spelling(one)}`: {one.help or ''}{_default(one)}" for one in options]
 
 
 def _spelling(option: click.Option) -> str:
@@ -139,7 +135,8 @@ def faults_page() -> str:
     advice: dict[str, list[str]] = {}
     for effect in CATALOGUE:
         words = EFFECT_WORDS[effect.name]
-        parts += [f"## {effect.name}: {words.title}", _what_it_is(effect)]
+        what = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
+        parts += [f"## {effect.name}: {words.title}", what]
         advice.setdefault(words.consequence, []).append(effect.name)
         found = _found(effect.name)
         lines = [
@@ -151,10 +148,6 @@ def faults_page() -> str:
         parts.append("\n".join(filter(None, lines)))
     consequences = [f"- {_code(names)}: {text}" for text, names in advice.items()]
     return _page("The faults", [*parts, "## What to do", "\n".join(consequences)])
-
-
-def _what_it_is(effect: Effect) -> str:
-    return " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
 
 
 def _found(effect: str) -> str:
@@ -224,19 +217,16 @@ def options_page() -> str:
         "file does not name keeps its default. Names in `[brackets]` are sections of the file."
     ]
     for section in dict.fromkeys(option.section for option in options):
-        lines = [_option_line(option) for option in options if option.section == section]
+        lines = []
+        for option in (one for one in options if one.section == section):
+            limits = _limits(field_of(section, option.name))
+            value = f"`{option.default}` {option.unit}".strip() + f" ({limits})" * bool(limits)
+            lines.append(f"- `{option.name}` = {value}: {option.meaning}")
         names = [section] if section else [option.name for option in options if not option.section]
         readers = dict.fromkeys(s.name for s in STAGES if set(names) & set(s.options))
         parts += [f"## `[{section}]`" if section else "## At the top of the file"]
         parts += [f"Read by {', '.join(readers or ['the study layout'])}.", "\n".join(lines)]
     return _page("The options", parts)
-
-
-def _option_line(option: OptionText) -> str:
-    limits = _limits(field_of(option.section, option.name))
-    value = f"`{option.default}` {option.unit}".strip()
-    allowed = f" ({limits})" if limits else ""
-    return f"- `{option.name}` = {value}{allowed}: {option.meaning}"
 
 
 def field_of(section: str, name: str) -> FieldInfo:

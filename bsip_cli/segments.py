@@ -1,4 +1,4 @@
-"""The names of the segments, fixed for every table and file, and names as people read them."""
+"""The names of segments and landmarks, fixed for every table and file, and as people read them."""
 
 from __future__ import annotations
 
@@ -57,3 +57,25 @@ def mirrored(name: str) -> str:
     """The same on the other side: upper_arm_r for upper_arm_l; what has no side, itself."""
     other = {"_l": "_r", "_r": "_l"}.get(name[-2:])
     return name[:-2] + other if other else name
+
+
+# --- bony landmarks and joint centres that a marker may mark --------------------------------------
+
+
+_SIDED = (
+    *("forehead", "occiput", "temple", "acromion", "acromial_angle", "clavicle", "asis", "psis"),
+    *(f"{name}_{end}" for name in ("elbow", "knee", "malleolus") for end in ("lateral", "medial")),
+    *("styloid_radial", "styloid_ulnar", "wrist", "calcaneus"),
+    *(f"metacarpal_{k}" for k in (2, 3, 5)),
+    *(f"metatarsal_{k}" for k in (1, 2, 5)),
+)
+JOINT_CENTRES = frozenset(
+    f"{name}_centre_{side}"
+    for name in ("shoulder", "elbow", "hip", "knee", "ankle")
+    for side in "lr"
+)
+LANDMARKS = frozenset(
+    {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
+    | {f"{name}_{side}" for name in _SIDED for side in "lr"}
+    | JOINT_CENTRES
+)

@@ -86,18 +86,15 @@ def _mean(one: TableRow, other: TableRow) -> TableRow:
 
 
 def _row(row: dict[str, str]) -> TableRow:
+    """A radius of gyration with an i behind it has a negative square."""
     names = [[f"r{min(a, b)}{max(a, b)}_pct" for b in "xyz"] for a in "xyz"]
-    gyration = np.array([[_signed_square(row[name]) for name in line] for line in names])
-    com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
-    return TableRow(
-        float(row["mass_percent"]) / 100, com, gyration, float(row["mean_length_mm"]) / 1000
+    radii = np.array([[float(row[name].rstrip("i")) / 100 for name in line] for line in names])
+    signs = np.array(
+        [[-1.0 if row[name].endswith("i") else 1.0 for name in line] for line in names]
     )
-
-
-def _signed_square(percent: str) -> float:
-    imaginary = percent.endswith("i")
-    radius = float(percent.rstrip("i")) / 100
-    return -(radius**2) if imaginary else radius**2
+    com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
+    mass, length_m = float(row["mass_percent"]) / 100, float(row["mean_length_mm"]) / 1000
+    return TableRow(mass, com, np.array(signs) * radii**2, length_m)
 
 
 def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") -> Regression:

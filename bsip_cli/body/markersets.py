@@ -10,11 +10,10 @@ from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
 
-from bsip_cli.body.landmarks import JOINT_CENTRES, LANDMARKS
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import JOINT_CENTRES, LANDMARKS, SEGMENTS
 
 _TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
 
@@ -139,16 +138,11 @@ def _option_faults(data: dict, labels: list[str]) -> list[str]:
     faults = [f"{k}: expected a table" for k, v in tables.items() if not isinstance(v, dict)]
     if faults:
         return faults
-    faults += [
-        f"{label}: expected a weight of 0 or more"
-        for label, weight in weights.items()
-        if not (isinstance(weight, int | float) and 0 <= weight < inf)
-    ]
-    faults += [
-        f'{label}: expected aliases like ["NAME"]'
-        for label, names in aliases.items()
-        if not _are_words(names)
-    ]
+    for label, weight in weights.items():
+        if not (isinstance(weight, int | float) and 0 <= weight < inf):
+            faults.append(f"{label}: expected a weight of 0 or more")
+    odd = [label for label, names in aliases.items() if not _are_words(names)]
+    faults += [f'{label}: expected aliases like ["NAME"]' for label in odd]
     markers = optional.get("markers", [])
     if not _are_words(markers):
         return [*faults, 'optional markers: expected a list like ["RTHI"]']

@@ -10,11 +10,10 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Literal
 
-from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
-from bsip_cli.segments import LINKS, SEGMENTS, joint_of
+from bsip_cli.segments import LANDMARKS, LINKS, SEGMENTS, joint_of
 
 JointType = Literal["free", "spherical", "revolute"]
 
@@ -78,6 +77,14 @@ class Skeleton:
         for n in range(i + 1, len(self.segments)):
             if self.parents[n] in found:
                 found.append(n)
+        return found
+
+    def way(self, segment: str) -> list[int]:
+        """Segments from one to the base, which is not among them."""
+        found, i = [], self.index(segment)
+        while i > 0:
+            found.append(i)
+            i = self.parents[i]
         return found
 
     def side(self, segment: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bsip_cli.errors import printable
 from bsip_cli.pipeline import producer, stages_named
+from bsip_cli.report.words import count
 from bsip_cli.running.runner import Manner, run_stages
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
@@ -52,18 +53,13 @@ def _about(unit: Unit, person: Participant) -> Iterator[str]:
 
 def _trial(unit: Unit, trial: Trial) -> str:
     """One recording's time, markers and contacts."""
-    assert unit.participant is not None
     if not unit.stands("contacts", trial, unit.participant):
         return "refused, see above"
     facts, contacts = unit.facts("markers", trial), unit.read("contacts", trial)
-    markers = unit.read("markers", trial)
+    markers, rate_hz = unit.read("markers", trial), facts["marker_rate_hz"]
     seen = markers.loc[np.isfinite(markers["x_m"]), "marker"].nunique()
-    seconds = len(contacts) / facts["marker_rate_hz"]
-    valid = contacts["valid"].sum() / facts["marker_rate_hz"]
     plates = sum(name.endswith("_fz_N") for name in unit.read("wrench", trial).columns)
-    counted = "1 plate" if plates == 1 else f"{plates} plates"
-    forces = f"{counted}, every contact measured for {valid:.1f} s" if plates else "no forces"
-    return (
-        f"{seconds:.1f} s at {facts['marker_rate_hz']:g} Hz, {seen} markers "
-        f"({facts['marker_set']}), {forces}"
-    )
+    measured = f"every contact measured for {contacts['valid'].sum() / rate_hz:.1f} s"
+    forces = f"{count(plates, 'plate')}, {measured}" if plates else "no forces"
+    time = f"{len(contacts) / rate_hz:.1f} s at {rate_hz:g} Hz"
+    return f"{time}, {seen} markers ({facts['marker_set']}), {forces}"

@@ -6,6 +6,7 @@ import re
 import shutil
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +14,21 @@ import pandas as pd
 from scipy.ndimage import binary_erosion
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import is_made_from, remove, write_atomically
-from bsip_cli.body.exports import bids_motion
-from bsip_cli.body.exports.body_map import (
+from bsip_cli.artifacts import is_made_from, remove, write_bytes
+from bsip_cli.body.exports import FORMATS, bids_motion
+from bsip_cli.body.exports.identified import IdentifiedPerson
+from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
+from bsip_cli.body.exports.osim_given import (
     BodyMap,
+    GivenModel,
+    check_fits,
     check_segments,
     fitting_map,
     load_body_map,
+    read_given_model,
     shipped_names,
+    with_inertias,
 )
-from bsip_cli.body.exports.formats import FORMATS
-from bsip_cli.body.exports.identified import IdentifiedPerson
-from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim_given import GivenModel, check_fits, read_given_model, with_inertias
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.commands.export_recording import export_recordings
@@ -49,7 +52,6 @@ from bsip_cli.study.study import Participant, describe_dataset
 
 # Of a trial: names of files with their content, and what else the user should know.
 Texts = tuple[dict[str, str], str]
-_BODY = ("skeleton", "marker-positions")
 # Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.
 _EDGE = 5
 
@@ -59,7 +61,9 @@ def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callab
 
     model : of a participant, writes the model and returns its file's name and the outcome.
     """
-    study = opened.study
+    study, (_, reads, options) = opened.study, _TABLES[asked.what]
+    names = tuple(reads.split()), (), tuple(options.split())
+    stage = Stage("export", "trial", "Tables of a trial.", *names)
 
     def running() -> Generator[Outcome, None, None]:
         for participant in study.participants:
@@ -70,7 +74,7 @@ def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callab
                 if outcome.state != "done":
                     continue
             for trial in participant.trials:
-                unit = Unit(_READERS[asked.what], study, out, opened.config, participant, trial)
+                unit = Unit(stage, study, out, opened.config, participant, trial)
                 yield _export_tables(unit, asked, name)
 
     if asked.what == "bids" and asked.to is not None:
@@ -82,16 +86,14 @@ def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callab
 
 
 def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
-    waiting = lacking(unit)
-    if waiting is not None:
-        return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
-    assert unit.participant is not None
+    if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
+        return waiting
     folder = folder_of(unit, asked.to)
     try:
-        with held_alone(unit.out / unit.participant.id):
-            texts, note = _WRITERS[asked.what](unit, model)
+        with held_alone(unit.out / unit.person.id):
+            texts, note = _TABLES[asked.what][0](unit, model)
             for name, text in texts.items():
-                write_text(folder / name, text)
+                write_bytes(folder / name, text.encode())
     except BsipError as error:
         return Outcome("export", unit.name, "refused", (str(error),), error.exit_code)
     said = (f"{unit.name}: {note}",) if note else ()
@@ -101,13 +103,7 @@ def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
 
 def folder_of(unit: Unit, to: Path | None) -> Path:
     """Where a participant's files go."""
-    assert unit.participant is not None
-    return unit.out / unit.participant.id / "export" if to is None else to / unit.participant.id
-
-
-def write_text(path: Path, text: str) -> None:
-    """All of it, or nothing."""
-    write_atomically(path, lambda partial: partial.write_bytes(text.encode()))
+    return unit.out / unit.person.id / "export" if to is None else to / unit.person.id
 
 
 def _joints(unit: Unit, _: str) -> Texts:
@@ -117,8 +113,7 @@ def _joints(unit: Unit, _: str) -> Texts:
 
 
 def _bids(unit: Unit, _: str) -> Texts:
-    assert unit.trial is not None
-    trial, skeleton = unit.trial, load_skeleton(unit.config.skeleton)
+    trial, skeleton = unit.own_trial, load_skeleton(unit.config.skeleton)
     kinematics, wrench = unit.read("kinematics"), unit.read("wrench")
     times, labels, places = markers_from(unit.read("markers"))
     q = coordinates_from(kinematics, skeleton)[0]
@@ -126,14 +121,9 @@ def _bids(unit: Unit, _: str) -> Texts:
     determined = kinematics["determined"].to_numpy()
     columns = bids_motion.channels(labels, places, skeleton, q, determined, plates)
     session = f"ses-{trial.session}" if trial.session else ""
-    parts = (
-        trial.participant_id,
-        session,
-        f"task-{trial.task}",
-        f"tracksys-{bids_motion.TRACKSYS}",
-    )
     run = f"run-{trial.run}" if trial.run is not None else ""
-    stem = "_".join(filter(None, (*parts, run)))
+    task = (f"task-{trial.task}", f"tracksys-{bids_motion.TRACKSYS}", run)
+    stem = "_".join(filter(None, (trial.participant_id, session, *task)))
     place = "/".join(filter(None, (session, "motion", stem)))
     rate_hz = 1.0 / float(np.median(np.diff(times)))
     return {
@@ -165,11 +155,8 @@ def _opensim(unit: Unit, model: str) -> Texts:
     frames = slice(*found)
     times = trial.times_s[frames]
     acting = loads({foot: w[frames] for foot, w in wrenches.items()})
-    files = {
-        "model_file": model,
-        "coordinates_file": f"{name}_motion.mot",
-        "external_loads_file": f"{name}_loads.xml",
-    }
+    files = {"model_file": model, "coordinates_file": f"{name}_motion.mot"}
+    files |= {"external_loads_file": f"{name}_loads.xml"}
     texts[f"{name}_loads.mot"] = mot_text(name, times, acting, said)
     texts[f"{name}_loads.xml"] = loads_xml([*wrenches], f"{name}_loads.mot", said)
     setup = setup_xml(f"{name}_inverse-dynamics", files, times[0], times[-1], said)
@@ -178,19 +165,15 @@ def _opensim(unit: Unit, model: str) -> Texts:
     return texts, note + "; known loads are not in the model" * bool(unit.loads())
 
 
-_WRITERS: dict[str, Callable[[Unit, str], Texts]] = {
-    "joints": _joints,
-    "bids": _bids,
-    "opensim": _opensim,
-}
-_OPENSIM = ("kinematics", "contacts", "wrench", "plates", *_BODY)
-_READERS = {
-    name: Stage("export", "trial", "Tables of a trial.", reads, (), options)
-    for name, reads, options in (
-        ("joints", ("joint-moments",), ()),
-        ("bids", ("markers", "kinematics", "wrench"), ("skeleton",)),
-        ("opensim", _OPENSIM, ("skeleton", "loads", "joints")),
-    )
+# By what is asked for: who writes it, what that reads, and options.
+_TABLES: dict[str, tuple[Callable[[Unit, str], Texts], str, str]] = {
+    "joints": (_joints, "joint-moments", ""),
+    "bids": (_bids, "markers kinematics wrench", "skeleton"),
+    "opensim": (
+        _opensim,
+        "kinematics contacts wrench plates skeleton marker-positions",
+        "skeleton loads joints",
+    ),
 }
 
 
@@ -275,12 +258,11 @@ def _check(request: Request) -> None:
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
     """Ending of the file and who writes it, for every format that is asked for."""
-
-    def alone(text_of: Callable[[IdentifiedPerson], str]) -> Writer:
-        return lambda body: (text_of(body), "")
-
     formats = dict.fromkeys(request.formats or FORMATS)
-    writers = {FORMATS[name][0]: alone(FORMATS[name][1]) for name in formats}
+    writers: dict[str, Writer] = {
+        FORMATS[name][0]: partial(lambda text_of, body: (text_of(body), ""), FORMATS[name][1])
+        for name in formats
+    }
     if request.model_file is None:
         if request.model_bodies is not None:
             raise UsageError("--model-bodies belongs to --model-file", remedy="give both")
@@ -326,24 +308,20 @@ def _export(
 
     Returns the last file's name, too.
     """
-    waiting = lacking(unit)
-    if waiting is not None:
-        return "", replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
+    if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
+        return "", waiting
     folder = folder_of(unit, request.to)
     written: list[str] = []
     notes: list[str] = []
     errors: list[BsipError] = []
     try:
         with held_alone(unit.out / unit.name):
-            method = request.method
-            if method is None:
-                method, note = _chosen(unit)
-                notes.append(note)
+            method, why = (request.method, "") if request.method else _chosen(unit)
+            notes += [why] if why else []
             body = _identified(unit, skeleton, method)
-            if request.repair:
-                known = body.made_of
-                body = body.repaired()
-                notes += body.made_of[len(known) :]
+            known = len(body.made_of)
+            body = body.repaired() if request.repair else body
+            notes += body.made_of[known:]
             for ending, writer in writers.items():
                 path = folder / f"{body.name}{ending}"
                 try:
@@ -352,7 +330,7 @@ def _export(
                     remove(path)  # an older one would pass for this method's
                     errors.append(error)
                     continue
-                write_text(path, text)
+                write_bytes(path, text.encode())
                 written.append(path.name)
                 notes += [note] if note else []
     except BsipError as error:

@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, is_made_from
-from bsip_cli.diagnosis.cause import Cause, delay_by
-from bsip_cli.diagnosis.corrected_wrench import (
+from bsip_cli.diagnosis.cause import (
+    Cause,
     corrected_plates,
+    delay_by,
     is_fault_of_forces,
     is_of_the_forces,
 )
@@ -37,9 +38,8 @@ from bsip_cli.instruments.readings import Instruments
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import delay_words
-from bsip_cli.recordings.settle import SessionReading, Verdict
+from bsip_cli.recordings.settle import Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
@@ -109,38 +109,30 @@ def _copy_study(root: Path, out: Path, folder: Path) -> None:
 
 def _corrected(unit: Unit, folder: Path) -> Outcome:
     """One recording; as it was where nothing in it can be corrected."""
-    assert unit.trial is not None
-    waiting = lacking(unit)
-    if waiting is not None:
-        return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
-    path = folder / unit.trial.path.relative_to(unit.study.root)
+    if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
+        return waiting
+    path = folder / unit.own_trial.path.relative_to(unit.study.root)
     try:
-        _check_fresh(unit)
+        wrench = unit.path("wrench")
+        current = all(is_made_from(wrench, one) for one in unit.own_trial.files)
+        if not (current and is_made_from(unit.path("overall-diagnosis"), wrench)):
+            raise UsageError(
+                "has changed since it was read or diagnosed",
+                file=unit.own_trial.path,
+                remedy="run `bsip run` again",
+            )
         correction = _Correction(unit)
         said = [*correction.said]
         if said:
             rewrite = rewrite_c3d if path.suffix.lower() == ".c3d" else rewrite_trc_mot
             head = f"bsip {__version__}: corrected by the diagnosis of {unit.study.root.name}, "
-            head += f"{unit.name}; before: sha256 {file_hash(unit.trial.path)}"
-            rewrite(unit.trial.path, path, correction.of, [head, *said])
+            head += f"{unit.name}; before: sha256 {file_hash(unit.own_trial.path)}"
+            rewrite(unit.own_trial.path, path, correction.of, [head, *said])
         left = [f"not corrected: {one}" for one in correction.left]
         lines = [*(f"corrected: {one}" for one in said), *left] or ["nothing to correct"]
     except BsipError as error:
         return Outcome("export", unit.name, "refused", (f"{error}",), error.exit_code)
     return Outcome("export", unit.name, "done", tuple(f"{unit.name}: {one}" for one in lines))
-
-
-def _check_fresh(unit: Unit) -> None:
-    """The diagnosis is of the recording as it is now."""
-    assert unit.trial is not None
-    wrench = unit.path("wrench")
-    current = all(is_made_from(wrench, path) for path in unit.trial.files)
-    if not (current and is_made_from(unit.path("overall-diagnosis"), wrench)):
-        raise UsageError(
-            "has changed since it was read or diagnosed",
-            file=unit.trial.path,
-            remedy="run `bsip run` again",
-        )
 
 
 class _Correction:
@@ -151,7 +143,9 @@ class _Correction:
 
     def __init__(self, unit: Unit) -> None:
         self.unit, self.left = unit, list[str]()
-        self._opened, self._session = _opened(unit)
+        trial, table = unit.own_trial, unit.read("readings")
+        self._session = reading_of(table, unit.facts("readings"), trial)
+        self._opened = opened(unit, trial).in_frame(self._session.frame)
         events = unit.read("marker-events")
         exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
@@ -373,12 +367,11 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
     Where it did not look at it: what it names of the instruments in all others of the session, at
     least two, and what the laboratory of the person is known to have.
     """
-    assert unit.participant is not None and unit.trial is not None
     looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
     here = [one for one in causes if unit.name in one.trials]
     if unit.name in looked_at:
         return here
-    session = {t.stem for t in unit.participant.trials if t.session == unit.trial.session}
+    session = {t.stem for t in unit.person.trials if t.session == unit.own_trial.session}
     others = session & set(looked_at)
     shared = [
         one
@@ -400,20 +393,13 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
 
 def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
     """Rows about the laboratory of a person who was in one only, or about this session in it."""
-    assert unit.participant is not None and unit.trial is not None
     of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
-    mine = [number for number, persons in of_all if unit.participant.id in persons]
+    mine = [number for number, persons in of_all if unit.person.id in persons]
     if len(mine) != 1:
         return empty_table("laboratory")
     rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
-    session = "_ses-".join(filter(None, (unit.participant.id, unit.trial.session)))
+    session = "_ses-".join(filter(None, (unit.person.id, unit.own_trial.session)))
     return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
-
-
-def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
-    assert unit.trial is not None
-    session = reading_of(unit.read("readings"), unit.facts("readings"), unit.trial)
-    return opened(unit, unit.trial).in_frame(session.frame), session
 
 
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:

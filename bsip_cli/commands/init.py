@@ -8,6 +8,7 @@ import os
 import shutil
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
@@ -21,8 +22,16 @@ from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
 from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
-from bsip_cli.study.new_study import Named, check_participant, counted, is_sequence, name_all, plain
-from bsip_cli.study.participants import UNKNOWN, PeopleTable, Row, participant_of, read_people
+from bsip_cli.study.new_study import Named, counted, is_sequence, name_all, plain
+from bsip_cli.study.participants import (
+    KNOWN,
+    NAME,
+    UNKNOWN,
+    PeopleTable,
+    Row,
+    participant_of,
+    read_people,
+)
 from bsip_cli.study.trials import listed
 
 # --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
@@ -89,7 +98,11 @@ def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> Stu
     """The one shipped set that recordings fit; several are left to guess; a starter where none."""
     guessed: dict[str, list[Source]] = defaultdict(list)
     for source in sources:
-        guessed[_shipped(source)].append(source)
+        name = ""  # without a shipped set that fits, or with two people in the file, as ingest says
+        with suppress(BadDataError):
+            guess = told_from(source.written)
+            name = guess.name if guess.is_shipped else ""
+        guessed[name].append(source)
     unknown = guessed.pop("", [])
     if not guessed:
         return _starter(unknown, named)
@@ -108,19 +121,10 @@ def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> Stu
     return StudyMarkers(name, "", tuple(notes))
 
 
-def _shipped(source: Source) -> str:
-    """The shipped set that a recording fits; empty without one, or with two people in the file."""
-    try:
-        guess = told_from(source.labels)
-    except BadDataError:
-        return ""  # ingest says it of the file
-    return guess.name if guess.is_shipped else ""
-
-
 def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
     """A first set of all labels, those of static trials first."""
     order = sorted(sources, key=lambda source: named[source.path].task != "static")
-    labels = dict.fromkeys(label for source in order for label in source.labels)
+    labels = dict.fromkeys(label for source in order for label in source.written)
     try:
         guess = told_from(tuple(labels))
     except BadDataError as several:
@@ -130,10 +134,8 @@ def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMar
         f"no shipped marker set fits: {STARTER} in the study is a first one, guessed from the "
         "labels; check it before you trust a number"
     )
-    source = printable(order[0].path.name)
-    return StudyMarkers(
-        STARTER, starter_toml(guess.marker_set, guess.unknown, source, STARTER), (note,)
-    )
+    named_in = printable(order[0].path.name), STARTER
+    return StudyMarkers(STARTER, starter_toml(guess.marker_set, guess.unknown, *named_in), (note,))
 
 
 # --------------------------------------------------------------------------------------------------
@@ -142,20 +144,12 @@ def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMar
 _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
 
 
-@dataclass(frozen=True)
-class Request:
-    """What was asked: where recordings are and the study goes, whose they are, links or copies."""
-
-    given: tuple[Path, ...]
-    out: Path
-    participant: str
-    link: bool
-
-
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Everything that will be written."""
+    """Everything that will be written, and where; links instead of copies where asked."""
 
+    out: Path
+    link: bool
     named: Mapping[Path, Named]  # by the source's path
     sources: tuple[Source, ...]
     people: Mapping[str, StatedPerson]
@@ -165,7 +159,7 @@ class _Plan:
     notes: tuple[str, ...]
 
 
-def init_command(request: Request) -> int:
+def init_command(given: tuple[Path, ...], out: Path, participant: str, link: bool) -> int:
     """Make the study, and print what lies where and what was not used.
 
     Returns 0, or 3 where a recording cannot be used.
@@ -178,9 +172,17 @@ def init_command(request: Request) -> int:
     BadDataError
         No recording can be used.
     """
-    participant = _participant(request.participant)
-    _check_out(request.out)
-    files = list_files(request.given, request.out)
+    wished = participant
+    if participant and not NAME.fullmatch(participant):
+        participant = f"sub-{participant}"
+        if not NAME.fullmatch(participant):
+            raise UsageError(
+                f"--participant {wished!r}",
+                expected="sub- and letters or digits",
+                remedy="name it like sub-01",
+            )
+    _check_out(out)
+    files = list_files(given, out)
     sources, unused = read_sources(
         files, lambda some: tqdm(some, desc="init", unit="recording", disable=None)
     )
@@ -188,27 +190,16 @@ def init_command(request: Request) -> int:
         _say(_unused_lines(unused))
         raise BadDataError(
             "no recording can be used" if unused else "no files",
-            file=", ".join(map(str, request.given)),
+            file=", ".join(map(str, given)),
             expected="C3D files, or TRC files with their MOT or STO beside them",
             remedy="correct what is said of each" if unused else "name the folder they lie in",
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
-    plan = _planned(sources, unused, participant, tables)
-    _write(request, plan)
-    _say(_told(request, plan))
+    plan = _planned(out, link, sources, unused, participant, tables)
+    _write(plan)
+    _say(_told(plan))
     return 3 if any(one.is_fault for one in unused) else 0
-
-
-def _participant(name: str) -> str:
-    checked = check_participant(name) if name else ""
-    if name and not checked:
-        raise UsageError(
-            f"--participant {name!r}",
-            expected="sub- and letters or digits",
-            remedy="name it like sub-01",
-        )
-    return checked
 
 
 def _check_out(out: Path) -> None:
@@ -230,9 +221,14 @@ def _check_out(out: Path) -> None:
 
 
 def _planned(
-    sources: Sequence[Source], unused: Sequence[Unused], participant: str, tables: Sequence[Path]
+    out: Path,
+    link: bool,
+    sources: Sequence[Source],
+    unused: Sequence[Unused],
+    participant: str,
+    tables: Sequence[Path],
 ) -> _Plan:
-    all_named, notes = name_all([source.found for source in sources], participant)
+    all_named, notes = name_all(sources, participant)
     named = {one.found.path: one for one in all_named}
     of: dict[str, dict[str, StatedPerson]] = defaultdict(dict)
     for source in sorted(sources, key=lambda source: named[source.path].stem):
@@ -248,31 +244,36 @@ def _planned(
     left = tuple(one for one in unused if one.path not in used)
     markers = study_markers(sources, named)
     said += markers.notes
-    return _Plan(named, tuple(sources), people, markers, left, tuple(used), tuple(said))
+    return _Plan(out, link, named, tuple(sources), people, markers, left, tuple(used), tuple(said))
 
 
 # --- what is written ------------------------------------------------------------------------------
 
 
-def _write(request: Request, plan: _Plan) -> None:
+def _write(plan: _Plan) -> None:
     """Everything into a folder beside, which gets the study's name when it is whole."""
-    out = request.out.absolute()
+    out = plan.out.absolute()
     made = out.with_name(f".{out.name}.{os.getpid()}.bsip-part")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         made.mkdir()
         try:
-            for source, target in _files(plan):
+            for source, target, _ in _files(plan):
                 place = made / target
                 place.parent.mkdir(parents=True, exist_ok=True)
-                if request.link:
+                if plan.link:
                     place.symlink_to(source.resolve())
                 else:
                     shutil.copy2(source, place)
+            people = [
+                (name, one.sex or "n/a", *("n/a" if x is None else f"{x:.6g}" for x in known))
+                for name, one in plan.people.items()
+                for known in [(one.mass_kg, one.height_m)]
+            ]
             texts = {
-                "participants.tsv": _table(_people_rows(plan.people)),
+                "participants.tsv": _table([KNOWN, *people]),
                 "study.toml": _study_toml(plan),
-                "sources.tsv": _table(_source_rows(request, plan)),
+                "sources.tsv": _table(_source_rows(plan)),
             } | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
             for name, text in texts.items():
                 (made / name).write_text(text, encoding="utf-8")
@@ -283,38 +284,21 @@ def _write(request: Request, plan: _Plan) -> None:
             shutil.rmtree(made, ignore_errors=True)
             raise
     except OSError as error:
-        raise not_writable(request.out, error) from None
+        raise not_writable(plan.out, error) from None
 
 
-def _files(plan: _Plan) -> Iterator[tuple[Path, Path]]:
-    """Each file that is used, and where it goes in the study."""
+def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
+    """Each file that is used, where it goes in the study, and what it is of."""
     for source in plan.sources:
         named = plan.named[source.path]
         for path in filter(None, (source.path, source.forces)):
-            yield path, named.folder / f"{named.stem}{path.suffix.lower()}"
+            yield path, named.folder / f"{named.stem}{path.suffix.lower()}", named
 
 
-def _people_rows(people: Mapping[str, StatedPerson]) -> Iterator[tuple[str, ...]]:
-    yield "participant_id", "sex", "mass_kg", "height_m"
-    for name, stated in people.items():
-        mass, height = (
-            "n/a" if value is None else f"{value:.6g}"
-            for value in (stated.mass_kg, stated.height_m)
-        )
-        yield name, stated.sex or "n/a", mass, height
-
-
-def _source_rows(request: Request, plan: _Plan) -> Iterator[tuple[str, ...]]:
+def _source_rows(plan: _Plan) -> Iterator[tuple[str, ...]]:
     yield _COLUMNS
-    trials = {
-        path: plan.named[source.path]
-        for source in plan.sources
-        for path in (source.path, source.forces)
-        if path
-    }
-    made = "linked" if request.link else "copied"
-    for source, target in _files(plan):
-        named = trials[source]
+    made = "linked" if plan.link else "copied"
+    for source, target, named in _files(plan):
         yield str(target), str(source.absolute()), made, named.participant, named.task, ""
     for table in plan.tables:
         yield "participants.tsv", str(table.absolute()), "read", "n/a", "n/a", ""
@@ -322,7 +306,7 @@ def _source_rows(request: Request, plan: _Plan) -> Iterator[tuple[str, ...]]:
         yield "n/a", str(one.path.absolute()), "not used", "n/a", "n/a", one.why
 
 
-def _table(rows: Iterator[tuple[str, ...]]) -> str:
+def _table(rows: Iterable[tuple[str, ...]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, delimiter="\t", lineterminator="\n")
     writer.writerows([printable(cell) for cell in row] for row in rows)
@@ -361,7 +345,7 @@ def _say(lines: Iterator[str]) -> None:
         click.echo(printable(line))
 
 
-def _told(request: Request, plan: _Plan) -> Iterator[str]:
+def _told(plan: _Plan) -> Iterator[str]:
     for name, stated in plan.people.items():
         trials = sorted(n.stem for n in plan.named.values() if n.participant == name)
         short = listed(stem.removeprefix(f"{name}_") for stem in trials)
@@ -378,11 +362,10 @@ def _told(request: Request, plan: _Plan) -> Iterator[str]:
     yield f"marker set: {plan.markers.name}"
     yield from plan.notes
     yield from _unused_lines(plan.unused)
-    files = "linked" if request.link else "copied"
-    n = sum(1 for _ in _files(plan))
-    yield f"{n} files {files}; sources.tsv says what came from where"
-    results = request.out / "derivatives" / "bsip"
-    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(results))}"
+    files = "linked" if plan.link else "copied"
+    yield f"{len([*_files(plan)])} files {files}; sources.tsv says what came from where"
+    results = plan.out / "derivatives" / "bsip"
+    yield f"next: bsip run {quote(str(plan.out))} --out {quote(str(results))}"
 
 
 def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:

@@ -53,17 +53,13 @@ class Unused:
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
-    """A recording that can be read, with the forces beside a TRC."""
+class Source(Found):
+    """A recording that can be read, with the forces beside a TRC; ``written``: the labels of named
+    markers as in the file."""
 
-    found: Found
     forces: Path | None
     stated: StatedPerson
-    labels: tuple[str, ...]  # of named markers, as in the file
-
-    @property
-    def path(self) -> Path:
-        return self.found.path
+    written: tuple[str, ...]
 
 
 def list_files(given: Sequence[Path], out: Path) -> list[Listed]:
@@ -170,16 +166,6 @@ def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
     return _nearest(table, (file for file in files if file.kind == ".trc"))
 
 
-def _forces_of(one: Listed, files: Sequence[Listed]) -> list[Path]:
-    """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has."""
-    tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
-    is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
-    if not tables and is_alone:  # a file was given, and not the folder
-        beside = (p for p in entries(one.path.parent) if p.suffix.lower() in ENDINGS)
-        return [t.path for t in _nearest(one, (Listed(p, one.folders) for p in beside))]
-    return sorted(table.path for table in tables if _markers_of(table, files) == [one])
-
-
 def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
     """Those of its name that lie beside a file, else in the deepest folder that holds both."""
     name = trial_words(one.path)
@@ -207,7 +193,15 @@ def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Sourc
     """Read a recording as it will lie in the study."""
     forces = None
     if one.kind == ".trc":
-        recording, forces = _with_forces(one, _tables(_forces_of(one, files), unused), unused)
+        # tables of its name, from the nearest folder that has one, which no other TRC has
+        tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
+        own = [table for table in tables if _markers_of(table, files) == [one]]
+        is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
+        if not tables and is_alone:  # a file was given, and not the folder
+            beside = (Listed(path, one.folders) for path in entries(one.path.parent))
+            own = _nearest(one, (file for file in beside if file.kind in ENDINGS))
+        paths = sorted(file.path for file in own)
+        recording, forces = _with_forces(one, _tables(paths, unused), unused)
     else:
         recording = read_recording(one.path)
     bare = [label.rpartition(":")[2].strip() for label in recording.labels]
@@ -221,10 +215,10 @@ def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Sourc
             file=one.path,
         )
     median, fastest = marker_speeds(recording.markers_m[:, named], recording.marker_rate_hz)
-    labels = tuple(recording.labels[k] for k in named)
     names = frozenset(bare[k].casefold() for k in named)
-    found = Found(one.path, one.folders, recording.stated.name, names, median, fastest)
-    return Source(found, forces, recording.stated, labels)
+    found = (one.path, one.folders, recording.stated.name, names, median, fastest)
+    written = tuple(recording.labels[k] for k in named)
+    return Source(*found, forces, recording.stated, written)
 
 
 def _tables(paths: Sequence[Path], unused: list[Unused]) -> list[Path]:

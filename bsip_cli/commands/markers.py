@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
@@ -11,14 +10,13 @@ import click
 import numpy as np
 
 from bsip_cli.body.joint_centres import missing_landmarks
-from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set
+from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.labels import LabelMatch, match_labels
 from bsip_cli.recordings.marker_guess import (
     Guess,
-    SetFit,
     fits,
     starter_toml,
     told_from,
@@ -31,53 +29,49 @@ from bsip_cli.segments import in_words, without_side
 _RIVALS = 3
 
 
-@dataclass(frozen=True)
-class Request:
-    """What was asked: the file, a marker set ("auto" guesses), a person, where to write."""
-
-    file: Path
-    marker_set: str
-    prefix: str
-    write: Path | None
-
-
-def markers_command(request: Request) -> int:
+def markers_command(file: Path, marker_set: str, prefix: str, write: Path | None) -> int:
     """Print everything; write a starter set where asked, or where no shipped set fits well.
+
+    marker_set : "auto" guesses. prefix : of the person's labels. write : where the starter goes.
 
     Returns 0 where the set has all that a skeleton needs, 3 where something that a skeleton cannot
     do without is missing.
     """
-    recording = read_recording(request.file)
+    recording = read_recording(file)
     size = f"{len(recording.labels)} markers, {recording.n_frames} frames"
     corrected = [one for one in recording.findings if one.check in ("labels", "points")]
     _say(
         [
-            f"{request.file}: {size} at {recording.marker_rate_hz:g} Hz",
+            f"{file}: {size} at {recording.marker_rate_hz:g} Hz",
             *(f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected),
         ]
     )
-    guess, chosen = _chosen(request, recording)
-    complete = bool(chosen.markers) and _compared(request, recording, chosen)
+    guess, chosen = _chosen(recording, marker_set, prefix)
+    complete = bool(chosen.markers) and _compared(recording, chosen, prefix)
     if not chosen.markers:
         _say(["", "labels:", *_label_rows(recording, {}, "not understood")])
-    if request.write is not None or not (guess is None or guess.is_shipped):
-        _write_starter(request, guess or told_from(recording.labels, request.prefix))
+    if write is not None or not (guess is None or guess.is_shipped):
+        _write_starter(file, guess or told_from(recording.labels, prefix), write)
     return 0 if complete else 3
 
 
-def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool:
+def _compared(recording: Recording, chosen: MarkerSet, prefix: str) -> bool:
     """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
-    labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, request.prefix)
+    labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, prefix)
     _say([finding.sentence() for finding in paired])
     match = match_labels(
         labels,
         chosen.wanted(),
         optional=chosen.optional(),
         seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
-        prefix=request.prefix,
+        prefix=prefix,
     )
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
-    words = {k: _meaning(recording.labels[k], marker) for k, marker in there.items()}
+    words = {}
+    for k, marker in there.items():
+        renamed = "" if recording.labels[k].strip().endswith(marker.label) else f"{marker.label}: "
+        landmark = in_words(marker.landmark) if marker.landmark else "tracks only"
+        words[k] = f"{renamed}{in_words(marker.segment)}, {landmark}"
     who = [f"labels of the person with the prefix '{match.prefix}'"] if match.prefix else []
     _say([*who, "", "labels:", *_label_rows(recording, words, "not in the set")])
     config = load_config([])
@@ -99,37 +93,30 @@ def _say(lines: Sequence[str]) -> None:
 # --- which set ---------------------------------------------------------------------------------
 
 
-def _chosen(request: Request, recording: Recording) -> tuple[Guess | None, MarkerSet]:
+def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess | None, MarkerSet]:
     """The set that was named, or what the labels tell; says which. No guess where one was named."""
-    if request.marker_set != "auto":
-        chosen = load_marker_set(request.marker_set)
+    if marker_set != "auto":
+        chosen = load_marker_set(marker_set)
         _say(["", f"marker set: {chosen.name} ({chosen.description}), as asked"])
         return None, chosen
     ranked = fits(recording.labels)
-    guess = told_from(recording.labels, request.prefix)
+    guess = told_from(recording.labels, prefix)
     chosen, best = guess.marker_set, guess.base
     if best is None:
         told = f"of {ranked[0].labels} labels the words tell {len(chosen.markers)}"
-        _say(["", f"marker set: none of the shipped sets fits; {told}"])
-        _say([_rival(fit) for fit in ranked[:_RIVALS]])
-        return guess, chosen
-    others = [fit for fit in ranked if fit is not best][: _RIVALS - 1]
-    added = len(chosen.markers) - best.found
-    more = "" if guess.is_shipped else f"; {added} more labels by their words"
-    _say(
-        [
-            "",
-            f"marker set: {best.marker_set.name} ({best.marker_set.description}), guessed: "
+        said = f"none of the shipped sets fits; {told}"
+    else:
+        added = len(chosen.markers) - best.found
+        more = "" if guess.is_shipped else f"; {added} more labels by their words"
+        said = (
+            f"{best.marker_set.name} ({best.marker_set.description}), guessed: "
             f"{best.required_found} of its {best.required} markers (optional ones aside), "
-            f"{best.found} of {best.labels} labels{more}",
-            *map(_rival, others),
-        ]
-    )
+            f"{best.found} of {best.labels} labels{more}"
+        )
+    others = [fit for fit in ranked if fit is not best][: _RIVALS - (best is not None)]
+    names = [f"  {x.marker_set.name}: {x.required_found} of {x.required} markers" for x in others]
+    _say(["", f"marker set: {said}", *names])
     return guess, chosen
-
-
-def _rival(fit: SetFit) -> str:
-    return f"  {fit.marker_set.name}: {fit.required_found} of {fit.required} markers"
 
 
 # --- what is there ------------------------------------------------------------------------------
@@ -143,12 +130,6 @@ def _label_rows(recording: Recording, words: Mapping[int, str], others: str) -> 
         share = 100 * float(seen[:, k].mean()) if len(seen) else 0.0
         meaning = words.get(k, others) if share > 0 else "labelled, but seen in no frame"
         yield f"  {label:<{width}}  seen {share:5.1f} %  {meaning}"
-
-
-def _meaning(label: str, marker: Marker) -> str:
-    renamed = "" if label.strip().endswith(marker.label) else f"{marker.label}: "
-    landmark = in_words(marker.landmark) if marker.landmark else "tracks only"
-    return f"{renamed}{in_words(marker.segment)}, {landmark}"
 
 
 def _segment_rows(
@@ -177,7 +158,7 @@ def _segment_rows(
 # --- a first set --------------------------------------------------------------------------------
 
 
-def _write_starter(request: Request, guess: Guess) -> None:
+def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
     """Write the labels of the file as a marker set; never over a file that is there.
 
     Raises
@@ -185,15 +166,15 @@ def _write_starter(request: Request, guess: Guess) -> None:
     UsageError
         The file that was asked for is there, or cannot be written.
     """
-    target = request.write or Path(f"{request.file.stem.replace(' ', '_')}_markers.toml")
+    target = write or Path(f"{file.stem.replace(' ', '_')}_markers.toml")
     text = starter_toml(
-        guess.marker_set, guess.unknown, printable(request.file.name), printable(target.name)
+        guess.marker_set, guess.unknown, printable(file.name), printable(target.name)
     )
     try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(text)
+        with target.open("x", encoding="utf-8") as handle:
+            handle.write(text)
     except FileExistsError:
-        if request.write is None:
+        if write is None:
             _say(["", f"{target} is there already and is not written over"])
             return
         raise UsageError(
@@ -203,7 +184,7 @@ def _write_starter(request: Request, guess: Guess) -> None:
         ) from None
     except OSError as error:
         raise UsageError(f"cannot be written ({error.strerror})", file=target) from None
-    again = f"bsip markers {quote(str(request.file))} --marker-set {quote(str(target))}"
+    again = f"bsip markers {quote(str(file))} --marker-set {quote(str(target))}"
     _say(
         [
             "",

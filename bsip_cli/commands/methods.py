@@ -83,9 +83,8 @@ class _Results:
         for folder in self.people:
             yield from sorted(folder.glob(f"*_{kind}.parquet"))
 
-    def _tables(self, kind: str, file: str = "") -> Iterator[pd.DataFrame]:
-        for path in self._files(file or kind):
-            yield read_artifact(path, kind)
+    def _tables(self, kind: str) -> Iterator[pd.DataFrame]:
+        return (read_artifact(path, kind) for path in self._files(kind))
 
     @cached_property
     def _made(self) -> list[Mapping[str, Any]]:
@@ -161,16 +160,13 @@ class _Results:
 
     @property
     def marker_sets(self) -> str:
-        headers = (read_header(path) for path in self._files("person"))
-        sets = sorted({header["provenance"]["facts"]["marker_set"] for header in headers})
-        return listing(sets)
+        found = (read_header(path)["provenance"]["facts"] for path in self._files("person"))
+        return listing(sorted({facts["marker_set"] for facts in found}))
 
     @property
     def rates(self) -> str:
-        found = set()
-        for path in self._files("kinematics"):
-            times = read_artifact(path, "kinematics")["time_s"]
-            found.add(round(1.0 / float(np.median(np.diff(times))), 1))
+        times = (table["time_s"] for table in self._tables("kinematics"))
+        found = {round(1.0 / float(np.median(np.diff(one))), 1) for one in times}
         return listing([f"{rate:g}" for rate in sorted(found)])
 
     # --- what came of it ----------------------------------------------------------------------

@@ -13,21 +13,21 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
+from bsip_cli.report.candidates import analysed, candidates_of, causes_of, effects_in
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.errors import overall_pieces, use_sentence
 from bsip_cli.report.participant.errors import largest_changes
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
-from bsip_cli.report.verdict import Verdict, cause_line, light_of, put_right_sentence, verdict_of
+from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of
 from bsip_cli.report.words import listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
 
 _WIDEST = 100  # letters in a line
-_MOST = 5  # causes of a person, without --full
+_MOST = 3  # causes of a person, without --full: all fits on a screen of 24 lines
 
 
 def shown(out: Path, full: bool = False) -> Iterator[str]:
@@ -119,7 +119,7 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
     found = verdict_of(diagnosis, detection, gains, changes, budget)
-    right = put_right_sentence(_of_trials(folder, "marker-events"))
+    right = corrected_sentence(_of_trials(folder, "marker-events"))
     if light := _light(folder):
         found = replace(found, headline=f"{light.title}. {light.text}")
     changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
@@ -131,7 +131,7 @@ def _findings(
     folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame, alone: bool
 ) -> Iterator[str]:
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
-    error, which parameters to use, what is changed at the joints. Of one among many the first."""
+    error, which parameters to use. Of one among many the first."""
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
     light = _light(folder) or light_of(diagnosis, detection, budget)
     use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
@@ -139,20 +139,18 @@ def _findings(
     if not alone:
         return
     causes = causes_of(candidates_of(diagnosis))
-    everywhere = looked_at(detection, diagnosis)
+    everywhere = analysed(detection, diagnosis)
     for number, cause in enumerate(causes[:_MOST], start=1):
         yield _wrapped(cause_line(cause, everywhere), f"{number:2d}. ")
     if len(causes) > _MOST:
         yield f"  - {len(causes) - _MOST} more findings: --full"
-    if budget is not None and (pieces := overall_pieces(budget)):
+    if budget is not None and (pieces := overall_pieces(budget, effects_in(causes))):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
         yield _wrapped(f"The error of the table's parameters (RM): {parts}.", "  - ")
     if choice is not None:
         identified = _table(folder, "identification")
         assert identified is not None  # it was chosen among what was identified
         yield _wrapped(use_sentence(choice, identified, light.state == "large"), "  - ")
-    for said in largest_changes(_peaks(folder)):
-        yield _wrapped(f"{said}.", "  - ")
 
 
 def _light(folder: Path) -> Light | None:

@@ -95,7 +95,10 @@ def laid_out(trials: Sequence[TrialErrors]) -> Laid:
     stop = 0
     for key, terms in groups.items():
         columns = [x.of_unit_variance for x in terms.values()]
-        turn = _squeezing(columns, [trials[t].noise for t in terms])
+        white = [a / trials[t].noise[:, None] for t, a in zip(terms, columns, strict=True)]
+        flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
+        values, vectors = np.linalg.eigh(flat.T @ flat)
+        turn = vectors[:, values > _NEGLIGIBLE]  # the same covariance by as few as matter
         part = Part(*key, stop, stop + turn.shape[1])
         parts.append(part)
         stop = part.stop
@@ -166,14 +169,6 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
         folds=folds,
         adapt=adapt,
     )
-
-
-def _squeezing(columns: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> np.ndarray:
-    """(k, m) that gives the same covariance by as few columns as matter beside the noise."""
-    white = [a / s[:, None] for a, s in zip(columns, noises, strict=True)]
-    flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
-    values, vectors = np.linalg.eigh(flat.T @ flat)
-    return vectors[:, values > _NEGLIGIBLE]
 
 
 def _folds(

@@ -102,10 +102,12 @@ def error_terms(
     yield Term(INERTIA, "", INERTIA, False, regressor, None, root, segments)
     heavier = _HEAVIER * scene.phi[:, None]
     yield Term(INERTIA, "", f"{INERTIA} in all", False, regressor, None, heavier, segments)
-    joints = joint_errors(scene)
-    for k, joint in enumerate(JointCentre().targets(scene)):
+    centre = JointCentre()
+    for joint in centre.targets(scene):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS
-        yield Term(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
+        sd_m = JOINT_SD_M[joint.removesuffix("_l").removesuffix("_r")]
+        columns = sd_m * centre.tangent(scene, joint, np.zeros(3))
+        yield Term(term, joint, term, False, columns)
     swinging = _skin_inertia(scene)
     of_markers = _of_markers(scene, landmark_sd_m, skin_factor)
     for k, (segment, places, skin) in enumerate(of_markers):
@@ -128,17 +130,6 @@ def error_terms(
 def is_of_instruments(effect: Effect) -> bool:
     """Whether it is a fault of plates, clocks or the lab's vertical."""
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
-
-
-def joint_errors(scene: Scene) -> np.ndarray:
-    """(N, 6, 3 joints) change of the wrench for joint centres that are off by one sd."""
-    effect = JointCentre()
-    columns = [
-        JOINT_SD_M[target.removesuffix("_l").removesuffix("_r")]
-        * effect.tangent(scene, target, np.zeros(3))
-        for target in effect.targets(scene)
-    ]
-    return np.concatenate(columns, axis=2)
 
 
 def as_simulated(scene: Scene) -> Scene:
@@ -283,8 +274,6 @@ def noise_of_instruments(
     """(6,) standard deviation of the filtered residual, moments about a point, that white noise of
     the markers and the plates' own noise make: nothing of it is what a fit leaves over.
 
-    Parameters
-    ----------
     marker_noise_m : white noise of the markers at ``rate_hz``, as the smoothing has found it.
     cutoff_hz : of the Gaussian low-pass that the residual has passed, which leaves half of the
         power there. The spline's own smoothing is not counted: so the noise is not more than this.

@@ -150,8 +150,6 @@ class Piece:
 class Fitted:
     """The model beside some faults.
 
-    Attributes
-    ----------
     faults : with their values; ``starts``: first coefficient of each, behind the ordinary ones.
     pieces : of the trials. root, mean (K,), covariance (K, K) : of all coefficients.
     log_likelihoods : (T,) of the trials at the mean. log_evidence : of all, natural logarithm.

@@ -147,9 +147,12 @@ class Scores:
 
 def scores_of(library: Library, fit: Fitted) -> Scores:
     """Given what the model holds by now, its scales and its noise: one linear step."""
-    pulls, inside, grams = zip(
-        *(_products(library, fit, t) for t in range(len(fit.pieces))), strict=True
-    )
+    pulls, inside, grams = [], [], []
+    for t, piece in enumerate(fit.pieces):
+        with_right, with_columns, own = library.products(fit, t)
+        pulls.append(with_right - fit.mean[piece.used] @ with_columns)
+        inside.append(fit.root_of_covariance[piece.used].T @ with_columns)
+        grams.append(own)
     count = len(library.places)
     log_factor = np.empty(count)
     sizes, known = [np.zeros(0)] * count, [np.zeros(0)] * count
@@ -185,17 +188,6 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
     medians = [[float(np.median(x)) for x in one.values()] or [1.0] for one in saved]
     inflation = np.array([max(1.0, float(np.median(one))) for one in medians])
     return Scores(log_factor, tuple(sizes), tuple(known), inflation)
-
-
-def _products(
-    library: Library, fit: Fitted, trial: int
-) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
-    """Of the white signatures of a trial: with what is left (C,), with the coefficients' spread
-    (K, C), and each candidate's with itself (k, k)."""
-    piece = fit.pieces[trial]
-    with_right, with_columns, grams = library.products(fit, trial)
-    inside = fit.root_of_covariance[piece.used].T @ with_columns
-    return with_right - fit.mean[piece.used] @ with_columns, inside, grams
 
 
 # --- how small each fault might have been and still been named ------------------------------------

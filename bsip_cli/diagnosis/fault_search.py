@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, refined, sized
 from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
+from bsip_cli.diagnosis.held_out import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
@@ -46,12 +46,6 @@ class Tried:
         rest = self.fit.log_evidence - before.log_evidence - each.sum()
         odds = self.log_prior + float((each / inflation).sum()) + float(rest)
         return replace(self, log_odds=odds)
-
-    def without_prior_odds(self, prior_odds: float) -> Tried:
-        """If it has no name, as likely before the data as not; else itself."""
-        if self.fault.effect.name != UNEXPLAINED:
-            return self
-        return replace(self, log_odds=self.log_odds - np.log(prior_odds))
 
     def evenly_or_not(self, inflation: np.ndarray, prior_odds: float) -> Iterator[Tried]:
         """Itself, and what acts like it but not evenly; prior_odds : of the second to the first."""
@@ -169,7 +163,9 @@ def _verdict(
     odds = library.prior_odds
     if any(x.effect.name == UNEXPLAINED and set(x.trials).isdisjoint(one.trials) for x in others):
         odds = 1.0  # what has no name in one trial is in another as likely as not
-        mine = {key: x.without_prior_odds(library.prior_odds) for key, x in mine.items()}
+        for key, x in mine.items():
+            if x.fault.effect.name == UNEXPLAINED:
+                mine[key] = replace(x, log_odds=x.log_odds - np.log(library.prior_odds))
     weighed = [each for x in mine.values() for each in x.evenly_or_not(inflation, odds)]
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
@@ -188,12 +184,8 @@ def _verdict(
 
 def _prior_of(library: Library, one: Hypothesis) -> float:
     """Logarithm of the prior odds of a fault, whatever the values of a scan."""
-    mine = [
-        x
-        for x, place in zip(library.log_prior, library.places, strict=True)
-        if place.kind == (one.effect, one.target, one.trials)
-    ]
-    return float(logsumexp(mine))
+    kind = (one.effect, one.target, one.trials)
+    return float(logsumexp(library.log_prior[[x.kind == kind for x in library.places]]))
 
 
 def one_round(session: Session, library: Library, fit: Fitted) -> list[Tried]:

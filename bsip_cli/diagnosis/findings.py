@@ -10,10 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
-from bsip_cli.diagnosis.held_out import HeldOut
+from bsip_cli.diagnosis.held_out import HeldOut, plain
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Effect, Reported
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
@@ -97,7 +96,7 @@ def _members(
         one = replace(fit.faults[number], effect=tried.fault.effect)
         sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
         if class_id:
-            sentence += f"; other causes look alike here: to tell them apart, {mine.effect.remedy}"
+            sentence += f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
             more |= {"verdict": "ambiguous", "class_id": class_id}
         else:
             probability = verdict.probability

@@ -190,7 +190,7 @@ def bend_of(
     waist = _sized(fewer, left, EFFECTS["joint_centre"], "waist", (), rng)
     if waist.share >= bend.share:
         return ()  # by so much scaling errs
-    alike = f"a second bend and soft tissue look alike here: to tell them apart, {effect.remedy}"
+    alike = f"a second bend and soft tissue look alike here: to distinguish them, {effect.remedy}"
     told = bend.finding(fewer, trial, None)
     told = replace(
         told,

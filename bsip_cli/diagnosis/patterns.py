@@ -152,7 +152,7 @@ class Curve(Component):
 
 
 class Bend(Curve):
-    """The same of a component that is right in standing: plates are checked with people on them."""
+    """The same of a component that is right in quiet stance, where plates are checked."""
 
     MUCH = 1.2  # times the body weight: in squats
 
@@ -163,8 +163,8 @@ class Bend(Curve):
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         return (
             f"an error of {OF_THE_LAB[target]} that is not in proportion to the load "
-            f"({self._error(values):+.1f} {unit_of(target)} at {self.MUCH:g} times the body "
-            "weight, none in standing)"
+            f"({self._error(values):+.1f} {unit_of(target)} at {self.MUCH:g} times body weight, "
+            f"0 {unit_of(target)} at body weight)"
         )
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:

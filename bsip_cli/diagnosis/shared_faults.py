@@ -86,15 +86,13 @@ def information_of(trials: Sequence[SharedTrial]) -> Information:
 
     About what one person shows alone they would not be: a few steps on two plates fit any fault.
     """
-    session = session_of([_without_the_shared(one) for one in trials])
+    own = []
+    for one in trials:  # without the ordinary terms that are asked of the laboratory
+        kept = tuple(x for x in _own_terms(one.errors) if x.scale != f"{INERTIA} in all")
+        own.append(replace(one, errors=replace(one.errors, terms=kept)))
+    session = session_of(own)
     moving = {k for k, one in enumerate(trials) if not one.standing}
     return _marginal(fitted(session, _hypotheses(trials, moving)), moving)
-
-
-def _without_the_shared(trial: FaultTrial) -> FaultTrial:
-    """Without the ordinary terms that are asked of the laboratory."""
-    kept = tuple(x for x in _own_terms(trial.errors) if x.scale != f"{INERTIA} in all")
-    return replace(trial, errors=replace(trial.errors, terms=kept))
 
 
 def _own_terms(errors: TrialErrors) -> list[Term]:

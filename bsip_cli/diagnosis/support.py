@@ -1,24 +1,26 @@
-"""Hands that hold on to something for a whole trial: a contact that no plate measures.
+"""What bears a person: hands that hold on for a whole trial, which no plate measures; and plates
+that do not carry the stated mass.
 
-Two things must come together. A hand stands still in the room while the trunk moves; and the
-plates miss a mean force that nothing inside a body can make: over a trial the mean horizontal
+Of hands two things must come together. A hand stands still in the room while the trunk moves; and
+the plates miss a mean force that nothing inside a body can make: over a trial the mean horizontal
 force is the change of momentum by time, the mean vertical one the weight beside it. What the hand
-bears from one moment to the next no instrument shows, so nothing else is asked of such a trial:
-the swings of that force would be taken for other causes.
+bears from one moment to the next no instrument shows, so nothing else is asked of such a trial: the
+swings of that force would be taken for other causes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
-from bsip_cli.effects.loads import UnmeasuredContact
+from bsip_cli.effects.loads import AddedMass, UnmeasuredContact
+from bsip_cli.effects.plates import PlateGain, PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.samples import Z95, effective_samples
@@ -111,7 +113,9 @@ def held_by(
     trunk = _moves_m(trunk_m)
     moves = {name: _moves_m(path) for name, path in hands_m.items()}
     still = tuple(h for h, x in moves.items() if x < STILL_M and STILLER * x < trunk)
-    force, error = missing_N.mean(axis=0), _standard_errors(missing_N)
+    counts = np.array([effective_samples(course) for course in missing_N.T])
+    error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated courses
+    force = missing_N.mean(axis=0)
     if not still or not _is_unbalanced(force, error, weight_N):
         return None
     return Support(
@@ -136,12 +140,6 @@ def _moves_m(path_m: np.ndarray) -> float:
     return float(np.sqrt(((path_m - path_m.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def _standard_errors(series: np.ndarray) -> np.ndarray:
-    """(3,) of the means of autocorrelated courses (n, 3)."""
-    counts = np.array([effective_samples(course) for course in series.T])
-    return series.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))
-
-
 def _is_unbalanced(force: np.ndarray, error: np.ndarray, weight_N: float) -> bool:
     aside = float(np.linalg.norm(force[:2]))
     aside_error = float(np.linalg.norm(error[:2]))
@@ -161,3 +159,105 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
             saved[test] = (missing[test] ** 2 - (missing[test] - mean) ** 2).sum(axis=1)
     blocks = np.bincount(np.unique(numbers, return_inverse=True)[1], weights=saved)
     return Gain(blocks, float((missing**2).sum()))
+
+
+# --- do the plates carry the person whose mass is stated? -----------------------------------------
+
+# The wrench alone cannot tell: free parameters follow the plates. Nothing in a quiet trial tells
+# why the plates read another mass, and nothing in moving ones where the inertial parameters follow
+# the plates or several plates carry the person. So this is a class of causes, of which every one is
+# printed with its own size.
+
+NOTICED = 0.02  # part of the mass from which on it is told, if a scale errs less
+SURE_OF_SCALE = 2.5  # standard deviations of a stated mass beyond which it is
+LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
+CLASS = "W"  # of the weight; those found in the motion are A, B, C
+REMEDY = (
+    "weigh the person as recorded, put a known weight on each plate, and read them with nobody on"
+)
+
+
+def weight_share(scene: Scene) -> float:
+    """Mean vertical force beyond the simulated one, part of body weight."""
+    apart = (scene.measured - scene.predicted)[scene.valid, 2]
+    return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
+
+
+def is_noticed(share: float, mass_sd: float) -> bool:
+    """Whether the plates read so much more or less (part of the stated mass) than a scale errs by.
+
+    mass_sd : standard deviation of the stated mass, part of it.
+    """
+    return abs(share) >= max(NOTICED, SURE_OF_SCALE * mass_sd)
+
+
+def agreed_share(scenes: Sequence[Scene], mass_sd: float) -> float | None:
+    """What moving trials say of the stated mass, like ``weight_share``; nothing if plates and scale
+    agree, or the trials do not agree with each other."""
+    apart = np.array([weight_share(one) for one in scenes])
+    share = float(np.median(apart))
+    agree = np.abs(apart - share).max() <= 0.5 * abs(share)
+    return share if agree and is_noticed(share, mass_sd) else None
+
+
+def loaded_plate(scenes: Iterable[Scene]) -> str | None:
+    """The plate that alone carries the person; None where several do."""
+    loaded = {
+        plate.name
+        for scene in scenes
+        for plate in scene.plates
+        if np.nan_to_num(plate.wrench[scene.valid, 2]).mean()
+        > LOADED * scene.mass_kg * GRAVITY_M_S2
+    }
+    return loaded.pop() if len(loaded) == 1 else None
+
+
+def stated_mass_findings(
+    share: float,
+    mass_kg: float,
+    mass_sd: float,
+    plate: str | None,
+    trials: tuple[str, ...],
+    manner: str,
+) -> tuple[Finding, ...]:
+    """The class of causes if the plates differ from the stated mass by more than a scale does.
+
+    share : of the stated mass, from ``weight_share`` or ``agreed_share``. mass_sd : its standard
+    deviation, part of it. plate : from ``loaded_plate``. trials : the recordings that tell.
+    manner : how they were read, in words.
+    """
+    if not is_noticed(share, mass_sd):
+        return ()
+    p_value = float(2 * norm.sf(abs(share) / mass_sd))  # how likely a scale errs by that much
+    error, extra = mass_sd * mass_kg, share * mass_kg
+    told = (
+        f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
+        f"{'more' if extra > 0 else 'less'} than stated"
+    )
+    weight, weight_error = extra * GRAVITY_M_S2, error * GRAVITY_M_S2
+    where = f"{plate or 'all'} fz"
+    gain = f"the plates' vertical gain is off by {100 * share:+.1f} %"
+    zero = f"the plates' zero is off by {weight:+.0f} N"
+    causes = [
+        (PlateGain.name, where, "gain", "1", share, mass_sd, gain, "laboratory"),
+        (PlateZero.name, where, "offset", "N", weight, weight_error, zero, "laboratory"),
+    ]
+    if extra > 0:
+        cause = f"{extra:.1f} kg are worn or carried that the stated mass leaves out"
+        causes.insert(0, (AddedMass.name, "", "mass", "kg", extra, error, cause, "person"))
+    return tuple(
+        Finding(
+            effect,
+            target,
+            trials,
+            (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
+            f"{told}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
+            p_value,
+            (1 - p_value) / (len(causes) + 1),
+            "ambiguous",
+            CLASS,
+            scope,
+            rms_change=abs(weight),
+        )
+        for effect, target, name, unit, x, sd, why, scope in causes
+    )

@@ -20,8 +20,6 @@ DISAGREEMENT = 0.02  # of the squared residuals of the markers
 class Parameter:
     """One number of an effect.
 
-    Attributes
-    ----------
     name, unit : as in the diagnosis artifact.
     least, most : physical bounds; outside, the explanation is none.
     typical : a size that labs meet: the unit of steps and the spread before the data.

@@ -106,8 +106,6 @@ _MOVEMENTS = {"flexion": "bending forwards", "lateral": "bending sideways", "axi
 class SplitTorso:
     """The two parts of a torso that bends a second time.
 
-    Attributes
-    ----------
     segment : that is split. joint_m : (3,) second joint from the first, segment axes.
     below : part of length and mass below the second joint.
     shares : per axis, in the order of ``AXES``, the part of the first joint's turn that happens at

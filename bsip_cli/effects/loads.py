@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from types import MappingProxyType
 
@@ -270,13 +269,10 @@ class Implement(Effect):
         mass = 1 / float(np.linalg.norm(centre))
         about_centre = (shape - 1) * (centre @ centre * np.eye(3) - np.outer(centre, centre))
         grips = scene.once((self.name, target), lambda: _grips(scene, target.split("+")))
-        each = [
-            scene.wrenches(one.segment)
-            @ Inertia(
-                mass, one.place_m + one.turn @ centre, mass * one.turn @ about_centre @ one.turn.T
-            ).phi()
-            for one in grips
-        ]
+        each = []
+        for segment, place_m, turn in grips:
+            held = Inertia(mass, place_m + turn @ centre, mass * turn @ about_centre @ turn.T)
+            each.append(scene.wrenches(segment) @ held.phi())
         return np.mean(each, axis=0)[..., None]
 
     def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -291,11 +287,8 @@ class Implement(Effect):
         the centre's place in the hand's axes."""
         moment, arm, distance = float(values[0]), float(values[1]), float(values[1] / values[4])
         sizes = (("mass", "kg", moment / distance), ("centre", "m", distance))
-        return (
-            *sizes,
-            ("inertia", "kg m2", moment * arm),
-            *parts_xyz("centre", "m", centre_m(values)),
-        )
+        parts = parts_xyz("centre", "m", centre_m(values))
+        return *sizes, ("inertia", "kg m2", moment * arm), *parts
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         distance = values[1] / values[4]
@@ -310,24 +303,17 @@ def centre_m(values: np.ndarray) -> np.ndarray:
     """(3,) from the hand's centre of mass, hand's axes: X is the palm's normal, Y to the arm."""
     _, arm, azimuth, elevation, shape = values
     flat = np.cos(elevation)
-    return (
-        arm / shape * np.array([np.sin(elevation), -flat * np.cos(azimuth), flat * np.sin(azimuth)])
-    )
+    axis = np.array([np.sin(elevation), -flat * np.cos(azimuth), flat * np.sin(azimuth)])
+    return arm / shape * axis
 
 
-@dataclass(frozen=True, eq=False)
-class _Grip:
-    """Where a hand holds: from its joint's origin ``place_m`` (3,), its axes; ``turn`` (3, 3) to
-    these from the axes in which the body's centre is given."""
+def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Where hands hold: segment; place (3,) from its joint's origin, its axes; and the turn (3, 3)
+    to these from the axes in which the body's centre is given.
 
-    segment: int
-    place_m: np.ndarray
-    turn: np.ndarray
-
-
-def _grips(scene: Scene, held_by: Sequence[str]) -> list[_Grip]:
-    """Of one hand its centre of mass; of two the middle between these, and how the one is turned
-    against the other, in the mean over what is measured."""
+    Of one hand its centre of mass; of two the middle between these, and how the one is turned
+    against the other, in the mean over what is measured.
+    """
     numbers = [scene.person.skeleton.index(name) for name in held_by]
     middle = np.mean([_path_m(scene, name) for name in held_by], axis=0)
     first = scene.motion.rotation[:, numbers[0]]
@@ -337,7 +323,7 @@ def _grips(scene: Scene, held_by: Sequence[str]) -> list[_Grip]:
         arm = middle - scene.motion.position_m[:, i]
         place = (own @ arm[..., None])[scene.valid, :, 0].mean(axis=0)
         turn = Rotation.from_matrix((own @ first)[scene.valid]).mean().as_matrix()
-        grips.append(_Grip(i, place, turn))
+        grips.append((i, place, turn))
     return grips
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 from types import MappingProxyType
 
@@ -31,15 +30,6 @@ def step(times_s: np.ndarray, at_s: float, rise_s: float = RISE_S) -> np.ndarray
     x = (times_s - at_s) / rise_s
     slope = np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi) / rise_s
     return np.stack([ndtr(x), slope, -x * slope / rise_s])
-
-
-def wrench_parts(scene: Scene, errors_m: np.ndarray, markers: Sequence[int]) -> np.ndarray:
-    """(3, N, 6, k) what s, s' and s'' change of the simulated wrench for marker errors s(t) e(t).
-
-    The pose follows the markers (N, len(markers), 3, k), so the simulation of the pose goes wrong
-    by the response to it, and lacks the opposite.
-    """
-    return -scene.response.parts(scene.pose_response.of(errors_m, markers))
 
 
 def during(course: np.ndarray, parts: np.ndarray) -> np.ndarray:
@@ -92,9 +82,13 @@ class MarkerShift(Effect):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         m = scene.person.markers.index(target)
-        parts = scene.once(
-            ("of a marker", m), lambda: wrench_parts(scene, self._directions(scene, m), [m])
-        )
+
+        def lacking() -> np.ndarray:
+            """(3, N, 6, 3) what s, s' and s'' change of the simulated wrench, which lacks what the
+            pose follows of an error s(t) along each axis."""
+            return -scene.response.parts(scene.pose_response.of(self._directions(scene, m), [m]))
+
+        parts = scene.once(("of a marker", m), lacking)
         return during(self.course(scene, values), parts) @ values[:3]
 
     def course(self, scene: Scene, values: np.ndarray) -> np.ndarray:
@@ -111,10 +105,7 @@ class MarkerShift(Effect):
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The slip's length and parts; one before the trial counts from its first frame."""
-        size, since = (
-            float(np.linalg.norm(values[:3])),
-            max(float(values[3]), float(scene.times_s[0])),
-        )
+        size, since = float(np.linalg.norm(values[:3])), float(max(values[3], scene.times_s[0]))
         return ("shift", "m", size), *parts_xyz("shift", "m", values), ("from_time", "s", since)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
@@ -135,11 +126,10 @@ def _off_their_places(scene: Scene, residual_m: np.ndarray) -> tuple[str, ...]:
     for m, name in enumerate(scene.person.markers):
         own = residual_m[:, m]
         if np.isfinite(own).all(axis=1).any():
-            off, at = np.nanmean(own, axis=0), _level_change(own, scene.rate_hz)
-            jump = (
-                0.0 if at is None else np.nanmean(own[at:], axis=0) - np.nanmean(own[:at], axis=0)
-            )
-            if max(np.linalg.norm(off), np.linalg.norm(jump)) > ASTRAY_M:
+            sizes, at = [np.nanmean(own, axis=0)], _level_change(own, scene.rate_hz)
+            if at is not None:  # and the jump
+                sizes.append(np.nanmean(own[at:], axis=0) - np.nanmean(own[:at], axis=0))
+            if max(map(np.linalg.norm, sizes)) > ASTRAY_M:
                 found.append(name)
     return tuple(found)
 

@@ -71,8 +71,6 @@ _OF_THE_MOTION = {
 class Scene:
     """One trial: what was measured of the motion and the ground, and a body to simulate.
 
-    Attributes
-    ----------
     times_s : (N,).
     q, v, a : (N, nq), (N, nv), (N, nv) in Pinocchio's conventions.
     phi : (10 n,) inertial parameters of the segments with mass, about their joint centres.
@@ -134,9 +132,8 @@ class Scene:
 
     def wrench_of(self, phi: np.ndarray) -> np.ndarray:
         """(N, 6) wrench of other parameters and the same motion."""
-        return predicted_wrench(self.model, self.q, self.v, self.a, phi[:, None], np.zeros(3))[
-            ..., 0
-        ]
+        motion = (self.model, self.q, self.v, self.a)
+        return predicted_wrench(*motion, phi[:, None], np.zeros(3))[..., 0]
 
     @cached_property
     def measured(self) -> np.ndarray:

@@ -11,17 +11,76 @@ in masses, centres and tensors and the weight of the log-det term follow from th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from bsip_cli.body.inertia import second_moments
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification import pseudo_inertia
 from bsip_cli.identification.equations import INSTRUMENT_GROUPS
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.prior import Prior
+
+# --- segments as pseudo-inertias, and the log-det divergence between them -------------------------
+
+# The 4x4 pseudo-inertia of a segment is J = [[S, m c], [m c^T, m]], S the second moments of mass
+# about the joint: a body can have these parameters exactly if J > 0 (Wensing, Kim and Slotine
+# 2018). Parameters (10 n,) of n segments are in Pinocchio's order.
+
+
+def _basis() -> np.ndarray:
+    """(10, 4, 4) derivative of J with respect to the ten parameters."""
+    basis = np.zeros((10, 4, 4))
+    basis[0, 3, 3] = 1.0
+    for k in range(3):
+        basis[1 + k, k, 3] = basis[1 + k, 3, k] = 1.0
+    for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))):
+        tensor = np.zeros((3, 3))
+        tensor[i, j] = tensor[j, i] = 1.0
+        basis[4 + k, :3, :3] = second_moments(tensor)
+    return basis
+
+
+BASIS = _basis()
+
+
+def pseudo_inertias(phi: np.ndarray) -> np.ndarray:
+    """(n, 4, 4) pseudo-inertias."""
+    return np.einsum("nk,kij->nij", phi.reshape(-1, 10), BASIS)
+
+
+def are_physical(phi: np.ndarray) -> bool:
+    """Every segment is one that a body can have."""
+    try:
+        np.linalg.cholesky(pseudo_inertias(phi))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def divergences(phi: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """(n,) Bregman divergence of -log det: tr(J0^-1 J) - log det(J0^-1 J) - 4; inf if not J > 0."""
+    if not are_physical(phi):
+        return np.full(len(phi) // 10, np.inf)
+    ratio = np.linalg.solve(pseudo_inertias(table), pseudo_inertias(phi))
+    return np.einsum("nii->n", ratio) - np.linalg.slogdet(ratio)[1] - 4.0
+
+
+def gradient(phi: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """(10 n,) of the sum of the divergences."""
+    pull = np.linalg.inv(pseudo_inertias(table)) - np.linalg.inv(pseudo_inertias(phi))
+    return np.einsum("nij,kji->nk", pull, BASIS).ravel()
+
+
+def hessian(phi: np.ndarray) -> np.ndarray:
+    """(10 n, 10 n) of the sum of the divergences, one block per segment, whatever the table."""
+    turned = np.einsum("nij,kjl->nkil", np.linalg.inv(pseudo_inertias(phi)), BASIS)
+    blocks = np.einsum("nkil,nmli->nkm", turned, turned)
+    out = np.zeros((phi.size, phi.size))
+    for i, block in enumerate(blocks):
+        out[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = block
+    return out
+
 
 # --- the convex problem behind ``consistent``, and a damped Newton method for it ------------------
 
@@ -53,15 +112,15 @@ class Objective:
 
     def value(self, x: np.ndarray) -> float:
         """Infinite where a segment is not physical."""
-        divergence = float(pseudo_inertia.divergences(self.phi(x), self.table).sum())
+        divergence = float(divergences(self.phi(x), self.table).sum())
         return float(0.5 * x @ self.quadratic @ x - self.linear @ x) + self.gamma * divergence
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        slope = pseudo_inertia.gradient(self.phi(x), self.table)
-        return self.quadratic @ x - self.linear + self.gamma * self.shown.T @ slope
+        pull = self.shown.T @ gradient(self.phi(x), self.table)
+        return self.quadratic @ x - self.linear + self.gamma * pull
 
     def hessian(self, x: np.ndarray) -> np.ndarray:
-        curvature = pseudo_inertia.hessian(self.phi(x))
+        curvature = hessian(self.phi(x))
         return self.quadratic + self.gamma * self.shown.T @ curvature @ self.shown
 
 
@@ -78,10 +137,7 @@ class Optimum:
 def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
     """Damped Newton; the Cholesky factor of every J keeps the steps among possible bodies.
 
-    Raises
-    ------
-    NumericalError
-        The equations hold values that are not finite.
+    NumericalError: the equations hold values that are not finite.
     """
     x = np.zeros_like(objective.linear) if start is None else start
     value = objective.value(x)
@@ -91,7 +147,7 @@ def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
         step = -scale * cho_solve(factor, scale * slope)
         promise = float(-slope @ step)
         if promise <= _LAST * (1.0 + abs(value)):
-            x = x + step if pseudo_inertia.are_physical(objective.phi(x + step)) else x
+            x = x + step if are_physical(objective.phi(x + step)) else x
             break
         length = 1.0
         while length > _SHORTEST:
@@ -197,16 +253,22 @@ def terms_of(problem: Problem) -> Terms:
     prior = problem.prior
     information, right = problem.trusted_with_instruments()
     size, beyond = len(prior.phi), len(right) - len(prior.phi)
-    body = [np.pad(one, (0, beyond)) for one in (*_spreads(prior), _total_mass(prior))]
-    spreads = (*body[:-1], *_of_instruments(size, beyond))
-    root = _inverse_root(sum(spreads, body[-1]))
+    every = tuple(range(len(prior.inertias)))
+    groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]
+    rows = [prior.white[[10 * i + k for i in pair for k in kind]] for pair, kind in groups]
+    masses = np.zeros(size)
+    masses[::10] = np.where(prior.fixed, 0.0, 1 / prior.total_mass_sd_kg)
+    *body, total = (np.pad(x.T @ x, (0, beyond)) for x in (*rows, masses[None]))
+    on = np.eye(size + beyond)[size:]  # of the instruments: where the plates are, when they read
+    spreads = [*body, *(on[k].T @ on[k] for k in INSTRUMENT_GROUPS if beyond)]
+    root = _inverse_root(sum(spreads, total))
     strength, directions = np.linalg.eigh(root.T @ information @ root)
     axes = root @ directions
     return Terms(
         np.maximum(strength, 0.0),
         axes.T @ (right - information[:, :size] @ prior.phi),
         tuple(axes.T @ precision @ axes for precision in spreads),
-        axes.T @ body[-1] @ axes,
+        axes.T @ total @ axes,
         axes[:size],
         axes[size:],
         prior.phi,
@@ -219,32 +281,6 @@ def _inverse_root(precision: np.ndarray) -> np.ndarray:
     scale = 1 / np.sqrt(np.diag(precision))
     lower = np.linalg.cholesky(precision * np.outer(scale, scale))
     return scale[:, None] * np.linalg.inv(lower).T
-
-
-def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
-    """Precision of all masses, all centres of mass, and the tensors of every pair."""
-    every = tuple(range(len(prior.inertias)))
-    groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]
-    return tuple(_precision_of(prior, *group) for group in groups)
-
-
-def _of_instruments(size: int, beyond: int) -> Iterator[np.ndarray]:
-    """Precision of where the plates are and of when they read, behind ``size`` parameters."""
-    for part in INSTRUMENT_GROUPS if beyond else ():
-        on = np.zeros(size + beyond)
-        on[size:][part] = 1.0
-        yield np.diag(on)
-
-
-def _precision_of(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:
-    rows = prior.white[[10 * i + k for i in segments for k in members]]
-    return rows.T @ rows
-
-
-def _total_mass(prior: Prior) -> np.ndarray:
-    masses = np.zeros(prior.phi.size)
-    masses[::10] = np.where(prior.fixed, 0.0, 1 / prior.total_mass_sd_kg)
-    return np.outer(masses, masses)
 
 
 def objective_of(terms: Terms, weights: Weights) -> Objective:
@@ -264,50 +300,38 @@ def _precision(terms: Terms, weights: Weights) -> np.ndarray:
 
 
 def fit_with_weights(terms: Terms) -> Fit:
-    """The fit of the largest evidence over the grid of log-det weights."""
+    """The fit of the largest evidence over the grid of log-det weights, each with spreads that no
+    longer change."""
     best: Fit | None = None
     spread = np.ones(len(terms.spreads))
     for gamma in _GAMMAS:
-        fit = _settled(terms, Weights(spread, gamma), best)
+        fit = fit_at(terms, Weights(spread, gamma), best)
+        for _ in range(_ROUNDS):
+            old, new = fit.weights.spread, _updated(terms, fit)
+            fit = fit_at(terms, Weights(new, gamma), fit)
+            if np.abs(np.log(new / old)).max() < _SETTLED:
+                break
         if best is None or fit.evidence > best.evidence:
             best, spread = fit, fit.weights.spread
     assert best is not None
     return best
 
 
-def _settled(terms: Terms, weights: Weights, near: Fit | None) -> Fit:
-    """Spreads that no longer change, for one log-det weight."""
-    fit = fit_at(terms, weights, near)
-    for _ in range(_ROUNDS):
-        spread = _updated(terms, fit)
-        change = np.log(spread / fit.weights.spread)
-        fit = fit_at(terms, Weights(spread, weights.gamma), fit)
-        if np.abs(change).max() < _SETTLED:
-            break
-    return fit
-
-
 def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     """Optimum and evidence for given weights."""
     optimum = minimise(objective_of(terms, weights), near.optimum.x if near else None)
-    curvature = pseudo_inertia.hessian(terms.table)
+    curvature = hessian(terms.table)
     before = _precision(terms, weights) + weights.gamma * terms.shown.T @ curvature @ terms.shown
-    evidence = (
-        -optimum.value
-        + 0.5 * np.linalg.slogdet(optimum.covariance)[1]
-        + 0.5 * np.linalg.slogdet(before)[1]
-    )
+    logs = sum(np.linalg.slogdet(x)[1] for x in (optimum.covariance, before))
     root = _inverse_root(before)
     covariance = root @ root.T
     decided = np.trace(np.eye(len(root)) - np.linalg.solve(covariance, optimum.covariance))
     # Beforehand nothing ties the instruments to the body or to each other: their share comes off.
-    kept, known = (_variances(terms.beside, one) for one in (optimum.covariance, covariance))
+    kept, known = (
+        np.sum(terms.beside @ x * terms.beside, axis=1) for x in (optimum.covariance, covariance)
+    )
     decided = max(float(decided - (1 - kept / known).sum()), 0.0)
-    return Fit(weights, optimum, float(evidence), covariance, decided)
-
-
-def _variances(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    return np.sum(rows @ covariance * rows, axis=1)
+    return Fit(weights, optimum, float(0.5 * logs - optimum.value), covariance, decided)
 
 
 def _updated(terms: Terms, fit: Fit) -> np.ndarray:
@@ -325,9 +349,6 @@ def _updated(terms: Terms, fit: Fit) -> np.ndarray:
     return spread
 
 
-# --------------------------------------------------------------------------------------------------
-
-
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.
 _LITTLE = 20.0
 
@@ -339,19 +360,9 @@ def estimate(problem: Problem) -> Estimate:
     a narrower prior does not count as knowledge from the wrench.
     """
     terms = terms_of(problem)
-    fit = fit_with_weights(terms)
-    shown = terms.shown
-    return Estimate(
-        terms.table + shown @ fit.optimum.x,
-        shown @ fit.optimum.covariance @ shown.T,
-        _note(fit, terms, 2 + len(problem.prior.pairs)),
-        prior_covariance=shown @ fit.prior_covariance @ shown.T,
-    )
-
-
-def _note(fit: Fit, terms: Terms, of_the_body: int) -> str:
-    """``of_the_body``: how many of the spreads are; those of the instruments come after them."""
-    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread[:of_the_body])
+    fit, shown = fit_with_weights(terms), terms.shown
+    of_the_body = fit.weights.spread[: 2 + len(problem.prior.pairs)]  # the instruments' come after
+    masses, centres, *tensors = 1 / np.sqrt(of_the_body)
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
         f"masses lie {masses:.2f} standard deviations among people from the table, centres of mass "
@@ -359,4 +370,9 @@ def _note(fit: Fit, terms: Terms, of_the_body: int) -> str:
     )
     if fit.decided < _LITTLE:
         note += "; too little motion, or errors that hide what it tells"
-    return note
+    return Estimate(
+        terms.table + shown @ fit.optimum.x,
+        shown @ fit.optimum.covariance @ shown.T,
+        note,
+        prior_covariance=shown @ fit.prior_covariance @ shown.T,
+    )

@@ -1,4 +1,4 @@
-"""The identification's normal equations, accumulated in blocks over trials."""
+"""The identification's normal equations, accumulated in blocks over trials, and their noise."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 from scipy import sparse
+from scipy.optimize import nnls
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.dynamics.pinocchio_model import bodies_of
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+from bsip_cli.statistics.samples import effective_samples
 
 # --- what the instruments may do wrong, beside the body -------------------------------------------
 
@@ -19,10 +21,7 @@ from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 # heavier limbs. Both are unknowns of the same equations: their spread is an option of [identify],
 # and follows from the data as that of the body's parameters does (``weights``).
 
-INSTRUMENT_GROUPS = (
-    slice(0, 2),
-    slice(2, 3),
-)  # of the columns: where the plates are, when they read
+INSTRUMENT_GROUPS = (slice(0, 2), slice(2, 3))  # columns: where the plates are, when they read
 INSTRUMENT_COUNT = 3
 
 
@@ -131,16 +130,6 @@ class NormalEquations:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
-    (n, 6) about the reference, and the accelerations' noise level (n,)."""
-
-    regressor: np.ndarray
-    measured: np.ndarray
-    noise_level: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ResidualSeries:
     """What a parameter vector leaves of one recording: residual (n, 6), noise level (n,)."""
 
@@ -165,11 +154,12 @@ def accumulate(
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        for block in _filtered_blocks(model, recording, cutoff_hz, reference_m, beside):
-            root = np.sqrt(weights_at(block.noise_level))
-            measured = root * block.measured
+        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, beside)
+        for regressor, wrench, noise_level in blocks:
+            root = np.sqrt(weights_at(noise_level))
+            measured = root * wrench
             for c in range(6):
-                rows = root[:, c, None] * block.regressor[:, c]
+                rows = root[:, c, None] * regressor[:, c]
                 information[c] += rows.T @ rows
                 right[c] += rows.T @ measured[:, c]
             squares += (measured**2).sum(axis=0)
@@ -188,16 +178,11 @@ def residual_series(
     """Per recording with usable frames, the filtered residual of a parameter vector."""
     series = []
     for recording in recordings:
-        blocks = list(_left_over(model, recording, cutoff_hz, reference_m, phi))
-        if blocks:
-            residuals, levels = zip(*blocks, strict=True)
-            series.append(ResidualSeries(np.concatenate(residuals), np.concatenate(levels)))
+        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m)
+        left = [(measured - regressor @ phi, level) for regressor, measured, level in blocks]
+        if left:
+            series.append(ResidualSeries(*map(np.concatenate, zip(*left, strict=True))))
     return series
-
-
-def _left_over(model, recording, cutoff_hz, reference_m, phi):
-    for block in _filtered_blocks(model, recording, cutoff_hz, reference_m):
-        yield block.measured - block.regressor @ phi, block.noise_level
 
 
 def _filtered_blocks(
@@ -206,7 +191,9 @@ def _filtered_blocks(
     cutoff_hz: float,
     reference_m: np.ndarray,
     beside: Instruments | None = None,
-) -> Iterator[Samples]:
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
+    (n, 6) about the reference, and the accelerations' noise level (n,)."""
     stride = stride_to(recording.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
     measured = operator @ np.where(
@@ -224,8 +211,80 @@ def _filtered_blocks(
             columns = beside.columns(regressor, recording.rate_hz)
             regressor = np.concatenate([regressor, columns], axis=2)
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
-        yield Samples(
-            filtered.reshape(rows.shape[0], 6, -1),
-            measured[start : start + _ROWS],
-            recording.noise_level[frames[start : start + _ROWS]],
-        )
+        mine = slice(start, start + _ROWS)
+        level = recording.noise_level[frames[mine]]
+        yield filtered.reshape(rows.shape[0], 6, -1), measured[mine], level
+
+
+# --- how much each component of the wrench may be trusted: residual size, its course, its memory --
+
+# What a fit leaves has two parts: one that is always there (sensors, the model), and one that grows
+# with the noise of the accelerations, which is large where the motion is fast. Both are estimated
+# from the residual itself.
+
+_NOISE_ROUNDS = 8
+_QUIETEST = 0.1  # of the root-mean-square: no frame is trusted more than ten times the average
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Of each component of the wrench [N, N m].
+
+    rms (6,) : the residual's size, frames counted by their weights.
+    effective (6,) : independent samples among ``samples``.
+    steady (6,), with_level (6,) : standard deviation that is always there, and per unit of the
+    accelerations' noise level.
+    """
+
+    rms: np.ndarray
+    effective: np.ndarray
+    samples: int
+    steady: np.ndarray
+    with_level: np.ndarray
+
+    def weights(self) -> np.ndarray:
+        """(6,) weights [1/N2, 1/(N m)2] that make the sum of squares count independent samples."""
+        return self.effective / self.samples / self.rms**2
+
+    def weights_at(self, noise_level: np.ndarray) -> np.ndarray:
+        """(n, 6) weights of frames by their noise level (n,), about 1 in the mean."""
+        return self.rms**2 / _variances(self.steady, self.with_level, noise_level)
+
+
+def even_noise(rms: np.ndarray, samples: int) -> Noise:
+    """Noise (6,) of the same size in all frames, each of them independent."""
+    return Noise(rms, np.full(6, float(samples)), samples, rms, np.zeros(6))
+
+
+def noise_of(series: list[ResidualSeries]) -> Noise:
+    """Noise from what a fit leaves, one series per recording."""
+    residual = np.concatenate([one.residual for one in series])
+    level = np.concatenate([one.noise_level for one in series])
+    fits = [_course(residual[:, c], level) for c in range(6)]
+    steady, with_level = np.array(fits).T
+    spread = np.sqrt(_variances(steady, with_level, level))
+    ends = np.cumsum([len(one.residual) for one in series])
+    spans = [(int(e - len(s.residual)), int(e)) for e, s in zip(ends, series, strict=True)]
+    counts = [effective_samples(residual[:, c] / spread[:, c], spans) for c in range(6)]
+    effective = np.clip(np.nan_to_num(counts, nan=1.0), 1.0, len(residual))
+    rms = 1 / np.sqrt((1 / spread**2).mean(axis=0))
+    return Noise(rms, effective, len(residual), steady, with_level)
+
+
+def _course(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
+    """Standard deviations (steady, per level) of likely Gaussian residuals (n,)."""
+    square = residual**2
+    mean = max(float(square.mean()), 1e-18)
+    terms = np.stack([np.ones_like(level), level**2], axis=1)
+    scale = np.maximum(terms.mean(axis=0), 1e-300)
+    variance = np.full_like(square, mean)
+    parts = np.array([mean, 0.0])
+    for _ in range(_NOISE_ROUNDS):
+        parts, _ = nnls(terms / scale / variance[:, None], square / variance)
+        parts[0] = max(parts[0], _QUIETEST**2 * mean)
+        variance = terms / scale @ parts
+    return float(np.sqrt(parts[0])), float(np.sqrt(parts[1] / scale[1]))
+
+
+def _variances(steady: np.ndarray, with_level: np.ndarray, level: np.ndarray) -> np.ndarray:
+    return steady**2 + with_level**2 * level[:, None] ** 2

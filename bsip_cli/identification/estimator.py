@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.dynamics.base_parameters import Basis
-from bsip_cli.identification.equations import NormalEquations
-from bsip_cli.identification.noise import Noise
+from bsip_cli.identification.equations import Noise, NormalEquations
 from bsip_cli.identification.prior import Prior
 
 
@@ -40,14 +39,12 @@ class Problem:
 
     def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
-        return self.equations.weighted(self._trusted_weights())
+        return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
     def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
         """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
-        return (self.beside or self.equations).weighted(self._trusted_weights())
-
-    def _trusted_weights(self) -> np.ndarray:
-        return self.noise.weights() / self.trust_ratio**2
+        equations = self.beside or self.equations
+        return equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,10 +26,7 @@ def estimate(problem: Problem) -> Estimate:
     In coordinates z with phi = phi_RM + S z, where z is N(0, 1) among people, the data give each
     eigendirection of their information a variance; those below 1 are taken from the data.
 
-    Raises
-    ------
-    NumericalError
-        No parameters with positive masses satisfy the data.
+    NumericalError: no parameters with positive masses satisfy the data.
     """
     prior = problem.prior
     information, right = problem.trusted_equations()
@@ -41,23 +38,13 @@ def estimate(problem: Problem) -> Estimate:
     target = (shown.T @ gradient) / strength[known]
     z = shown @ target
     note = f"{int(known.sum())} of {problem.basis.rank} combinations decided by the data"
-    if np.any(_masses(problem, z) < 0):
-        z = _with_positive_masses(problem, shown, target)
+    if np.any((prior.phi + prior.root @ z)[::10] < 0):
+        room = prior.phi[::10] * (1 - _SMALLEST_MASS)
+        z = smallest(shown.T, target, -prior.root[::10], room)
         note += "; masses kept positive"
     variance = np.where(known, 1.0 / np.where(known, strength, 1.0), 1.0)
     spread = prior.root @ directions
     return Estimate(prior.phi + prior.root @ z, (spread * variance) @ spread.T, note)
-
-
-def _masses(problem: Problem, z: np.ndarray) -> np.ndarray:
-    return (problem.prior.phi + problem.prior.root @ z)[::10]
-
-
-def _with_positive_masses(problem: Problem, shown: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Smallest z with ``shown^T z = target`` and every mass above a part of the table's."""
-    prior = problem.prior
-    slack = prior.phi[::10] * (1 - _SMALLEST_MASS)
-    return smallest(shown.T, target, -prior.root[::10], slack)
 
 
 # --- the quadratic programme of estimators that keep masses positive ------------------------------
@@ -74,10 +61,7 @@ def smallest(
 ) -> np.ndarray:
     """(k,) vector x of the smallest square with ``equal x = targets`` and ``below x <= limits``.
 
-    Raises
-    ------
-    NumericalError
-        There is none.
+    NumericalError: there is none.
     """
     settings = clarabel.DefaultSettings()
     settings.verbose = False

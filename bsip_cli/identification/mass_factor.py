@@ -24,10 +24,7 @@ def estimate(problem: Problem) -> Estimate:
     as OM trusts them (``trust_ratio``). Single segments keep the table's spread, once the sum of
     their masses is known.
 
-    Raises
-    ------
-    NumericalError
-        The number is not above 0.
+    NumericalError: the number is not above 0.
     """
     whole, phi, noise = problem.every_equation(), problem.prior.phi, problem.noise
     squares, products = np.einsum("i,cij,j->c", phi, whole.information, phi), whole.right @ phi
@@ -44,21 +41,12 @@ def estimate(problem: Problem) -> Estimate:
         )
     sd = problem.trust_ratio / float(np.sqrt(weights @ squares))
     before = factor * problem.prior.root
-    root = _with_known_sum(before)
+    total = before[::10].sum(axis=0)  # of the masses, whose sum is known
+    root = before - np.outer(before @ total, total) / (total @ total)
     covariance = root @ root.T + sd**2 * np.outer(phi, phi)
-    return Estimate(factor * phi, covariance, _note(factor, sd, phi), before @ before.T)
-
-
-def _with_known_sum(root: np.ndarray) -> np.ndarray:
-    """A root (P, k) of the covariance once the sum of all masses is known."""
-    total = root[::10].sum(axis=0)
-    return root - np.outer(root @ total, total) / (total @ total)
-
-
-def _note(factor: float, sd: float, phi: np.ndarray) -> str:
     low, high = factor - Z95 * sd, factor + Z95 * sd
-    before = float(phi[::10].sum())
-    return (
+    note = (
         f"the table's masses (RM) times {factor:.4f} (95 % interval {low:.4f} to {high:.4f}), "
-        f"{factor * before:.2f} kg in all"
+        f"{factor * float(phi[::10].sum()):.2f} kg in all"
     )
+    return Estimate(factor * phi, covariance, note, before @ before.T)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -68,8 +69,7 @@ def _eased(times_s: np.ndarray) -> np.ndarray:
 
 def load_movements() -> tuple[Movement, ...]:
     """The movements of ``configs/movements.toml``, those of one side once for each side."""
-    file = shipped("movements.toml")
-    rows = tomllib.loads(file.read_text(encoding="utf-8"))["movements"]
+    rows = tomllib.loads(shipped("movements.toml").read_text(encoding="utf-8"))["movements"]
     return tuple(
         _movement(row, side) for row in rows for side in (_SIDES if "side" in row else ("",))
     )
@@ -78,26 +78,15 @@ def load_movements() -> tuple[Movement, ...]:
 def _movement(row: dict, side: str) -> Movement:
     other = {"l": "r", "r": "l"}.get(side, "")
     words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
-    letters = {"side": side, "other": other}
-    return Movement(
-        row["name"].format(**letters),
-        row["text"].format(**words),
-        row["stance"].format(**letters),
-        tuple(_swing(part, part["joint"].format(**letters)) for part in row["joints"]),
-    )
-
-
-def _swing(part: dict, joint: str) -> Swing:
-    axis = _AXES.index(part["axis"])
-    mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
-    return Swing(
-        joint,
-        axis,
-        mirror * np.deg2rad(part["middle_deg"]),
-        mirror * np.deg2rad(part["swing_deg"]),
-        tuple(part["hz"]),
-        np.deg2rad(part.get("phase_deg", 0.0)),
-    )
+    letters, swings = {"side": side, "other": other}, []
+    for part in row["joints"]:
+        joint, axis = part["joint"].format(**letters), _AXES.index(part["axis"])
+        mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
+        middle, swing = (mirror * np.deg2rad(part[n]) for n in ("middle_deg", "swing_deg"))
+        phase = np.deg2rad(part.get("phase_deg", 0.0))
+        swings.append(Swing(joint, axis, middle, swing, tuple(part["hz"]), phase))
+    names = (row["name"].format(**letters), row["text"].format(**words))
+    return Movement(*names, row["stance"].format(**letters), tuple(swings))
 
 
 def possible(movement: Movement, person: Person) -> bool:
@@ -122,55 +111,45 @@ def motion_of(
     """
     step = 1.0 / RATE_HZ
     times = np.arange(-step, DURATION_S + 1.5 * step, step)
-    q = _standing_on(movement, person, model, _joint_angles(movement, person, model, times))
+    upright = pin.neutral(model)  # segments' Y up and X along the world's X
+    upright[3:7] = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
+    turns = _turns(movement, person, times)
+    q = _standing_on(movement, person, model, [pin.integrate(model, upright, x) for x in turns])
     steps = np.stack([pin.difference(model, a, b) for a, b in pairwise(q)])
     v = (steps[1:] + steps[:-1]) / (2 * step)
     a = (steps[1:] - steps[:-1]) / step**2
     return q[1:-1], v, a
 
 
-def _joint_angles(
-    movement: Movement, person: Person, model: pin.Model, times: np.ndarray
-) -> np.ndarray:
-    """(N, nq) with the base upright at the origin."""
+def _turns(movement: Movement, person: Person, times: np.ndarray) -> np.ndarray:
+    """(N, nv) of the joints, from standing upright."""
     skeleton = person.skeleton
-    turns = np.zeros((len(times), model.nv))
+    turns = np.zeros((len(times), len(skeleton.v_names)))
     for swing in movement.swings:
         joint = skeleton.joints.index(swing.joint)
         # A hinge has one coordinate, whatever axis it turns about.
         axis = swing.axis if skeleton.joint_types[joint] == "spherical" else 0
         turns[:, skeleton.v_starts[joint] + axis] += swing.angle_rad(times)
-    upright = _upright(model)
-    return np.stack([pin.integrate(model, upright, turn) for turn in turns])
+    return turns
 
 
-def _upright(model: pin.Model) -> np.ndarray:
-    """(nq,) neutral pose with the segments' Y up and X along the world's X."""
-    q = pin.neutral(model)
-    q[3:7] = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
-    return q
-
-
-def _standing_on(movement: Movement, person: Person, model: pin.Model, q: np.ndarray) -> np.ndarray:
-    """The same joint angles with the stance foot at its place, its lowest marker on the ground."""
+def _standing_on(
+    movement: Movement, person: Person, model: pin.Model, poses: Sequence[np.ndarray]
+) -> np.ndarray:
+    """(N, nq) with the stance foot where the first pose, upright, has it, its lowest marker on the
+    ground."""
     data = model.createData()
     foot = person.skeleton.index(f"foot_{movement.stance}")
-    home = _foot_on_ground(person, model, data, foot)
-    placed = q.copy()
+    pin.forwardKinematics(model, data, poses[0])
+    home = data.oMi[foot + 1].copy()
+    markers = person.markers_in_joint_m()[person.marker_segments == foot]
+    home.translation[2] = -min((home.rotation @ markers.T)[2], default=0.0)
+    placed = np.stack(poses)
     for row in placed:
         pin.forwardKinematics(model, data, row)
         base = home * data.oMi[foot + 1].inverse() * data.oMi[1]
         row[:7] = pin.SE3ToXYZQUAT(base)
     return placed
-
-
-def _foot_on_ground(person: Person, model: pin.Model, data: pin.Data, foot: int) -> pin.SE3:
-    pin.forwardKinematics(model, data, _upright(model))
-    home = data.oMi[foot + 1].copy()
-    markers = person.markers_in_joint_m()[person.marker_segments == foot]
-    lowest = min((home.rotation @ m)[2] for m in markers) if len(markers) else 0.0
-    home.translation[2] = -lowest
-    return home
 
 
 # --------------------------------------------------------------------------------------------------

@@ -25,8 +25,6 @@ _FORWARDS, _TILT = 1, 7  # of the readable parameters: com x, ixy
 class Spread:
     """How people stray from the table: one number, or one per segment with mass.
 
-    Attributes
-    ----------
     mass_sd_percent, inertia_sd_percent : scalars or (n,): of the mass; of the moments of a segment
         of known mass.
     com_sd_percent : scalar or (n, 3), segment axes: of the length of the rod that has the
@@ -48,8 +46,6 @@ class Spread:
 class Prior:
     """Mean and covariance of the inertial parameters before the data.
 
-    Attributes
-    ----------
     inertias : of the n segments with mass, in the segment frame.
     origin_in_joint_m : (n, 3) segment origin seen from the joint; parallel frames.
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).
@@ -188,11 +184,5 @@ def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) ->
     (3,) and of the moments."""
     moments = np.diag(inertia.tensor_kgm2)
     products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
-    return np.array(
-        [
-            mass * inertia.mass_kg,
-            *(com * rod_length_m(inertia)),
-            *(part * moments),
-            *(0.5 * part * products),
-        ]
-    )
+    centre = com * rod_length_m(inertia)
+    return np.r_[mass * inertia.mass_kg, centre, part * moments, 0.5 * part * products]

@@ -47,10 +47,7 @@ def estimate(problem: Problem) -> Estimate:
     covariance is that of the linear rule under both, not the inverse Hessian of the programme,
     which knows neither.
 
-    Raises
-    ------
-    NumericalError
-        The solver finds no parameters with positive masses.
+    NumericalError: the solver finds no parameters with positive masses.
     """
     programme = programme_of(problem)
     z = solve(programme)

@@ -101,28 +101,23 @@ class Beforehand:
 
 def beforehand(problem: Problem) -> Beforehand:
     """The table's spread of a problem, linearised about the table."""
-    return Beforehand(problem.prior.root, _readable(problem.prior))
-
-
-def _readable(prior: Prior) -> np.ndarray:
-    rows = np.empty_like(prior.root)
-    for i, sd in enumerate(prior.readable_sd):
-        block = slice(10 * i, 10 * i + 10)
-        rows[block] = readable_jacobian(prior.phi[block]) @ prior.root[block] / sd[:, None]
-    return rows
+    prior = problem.prior
+    blocks = zip(*(x.reshape(-1, 10, *x.shape[1:]) for x in (prior.phi, prior.root)), strict=True)
+    rows = np.concatenate([readable_jacobian(phi) @ root for phi, root in blocks])
+    return Beforehand(prior.root, rows / prior.readable_sd.reshape(-1, 1))
 
 
 def in_words(share: np.ndarray) -> str:
     """One segment's data shares (10,) as people say them, the mean over each group's numbers."""
-    return ", ".join(_group_in_words(name, float(share[part].mean())) for name, part in _GROUPS)
-
-
-def _group_in_words(name: str, share: float) -> str:
-    if share < _FROM_TABLE:
-        return f"{name} from the table (prior {100 * (1 - share):.0f} %)"
-    if share < 0.5:
-        return f"{name}: prior {100 * (1 - share):.0f} %"
-    return f"{name}: data {100 * share:.0f} %"
+    words = []
+    for name, part in _GROUPS:
+        data = float(share[part].mean())
+        prior = f"prior {100 * (1 - data):.0f} %"
+        if data < _FROM_TABLE:
+            words.append(f"{name} from the table ({prior})")
+        else:
+            words.append(f"{name}: {prior if data < 0.5 else f'data {100 * data:.0f} %'}")
+    return ", ".join(words)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -207,40 +202,29 @@ def rarity_of(prior: Prior, estimate: Estimate) -> Rarity:
 
     An estimate is drawn to the table where the data are silent, so the distance of a true body,
     chi-square with as many degrees as parameters, would let everything pass. The distances of
-    identified bodies of people are a sum of chi-squares weighted by what the data decide
-    (:func:`_spread`), taken for one with the same mean and variance (Satterthwaite 1946).
+    identified bodies of people are a sum of chi-squares weighted by what the data decide, taken
+    for one with the same mean and variance (Satterthwaite 1946).
 
     A segment's share is that of the standardised parameters nearest to its own (the corr-max
     transformation, Garthwaite and Koch 2016, Aust. N. Z. J. Stat. 58): with the masses' sum known,
     no segment can be put back alone.
     """
     free = ~prior.fixed_parameters()
-    whiten = _whitening(prior.root[free])
+    root = prior.root[free]
+    sd = np.linalg.norm(root, axis=1)
+    vectors, values, _ = np.linalg.svd(root / sd[:, None], full_matrices=False)
+    whiten = (vectors / values) @ vectors.T / sd  # to the nearest that are N(0, 1)
     parts = np.zeros(len(free))
     parts[free] = (whiten @ (estimate.phi - prior.phi)[free]) ** 2
     distance = float(parts.sum())
-    spread = _spread(estimate, free, whiten)
-    mean, square = float(np.trace(spread)), float((spread**2).sum())
-    probability = float(chi2.sf(distance * mean / square, mean**2 / square)) if mean > 0 else 1.0
-    by_segment = parts.reshape(-1, 10).sum(axis=1)
-    return Rarity(distance, probability, by_segment / distance if distance else by_segment)
-
-
-def _whitening(root: np.ndarray) -> np.ndarray:
-    """(F, F) from parameters of covariance ``root root^T`` to the nearest that are N(0, 1)."""
-    sd = np.linalg.norm(root, axis=1)
-    vectors, values, _ = np.linalg.svd(root / sd[:, None], full_matrices=False)
-    return (vectors / values) @ vectors.T / sd
-
-
-def _spread(estimate: Estimate, free: np.ndarray, whiten: np.ndarray) -> np.ndarray:
-    """(F, F) covariance of the estimates of people, whitened.
-
-    A body of people N(0, 1) is estimated as gain times itself, plus the data's errors.
-    """
+    # a body of people N(0, 1) is estimated as gain times itself, plus the data's errors
     after = whiten @ estimate.covariance[np.ix_(free, free)] @ whiten.T
     gain = np.eye(len(after)) - after
     if estimate.prior_covariance is not None:
         before = whiten @ estimate.prior_covariance[np.ix_(free, free)] @ whiten.T
         gain = np.eye(len(after)) - np.linalg.solve(before, after).T
-    return gain @ (gain.T + after)
+    spread = gain @ (gain.T + after)  # covariance of the estimates of people
+    mean, square = float(np.trace(spread)), float((spread**2).sum())
+    probability = float(chi2.sf(distance * mean / square, mean**2 / square)) if mean > 0 else 1.0
+    by_segment = parts.reshape(-1, 10).sum(axis=1)
+    return Rarity(distance, probability, by_segment / distance if distance else by_segment)

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.anthropometry import mean_length_m, stature_m
-from bsip_cli.body.joint_centres import JointCentres, hip_centres, joint_centres, unit
-from bsip_cli.body.keypoints import with_skin
+from bsip_cli.body.joint_centres import JointCentres, hip_centres, joint_centres, unit, with_skin
 from bsip_cli.body.markersets import MarkerSet
 from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import Skeleton
@@ -351,36 +350,32 @@ def functional_landmarks(
     for side in "lr":
         missing = not {f"knee_lateral_{side}", f"malleolus_lateral_{side}"} & landmarks.keys()
         heel = landmarks.get(f"calcaneus_{side}")
-        forefoot = _forefoot(side, marker_set, reference)
-        if not missing or hips is None or heel is None or forefoot is None:
+        front = [  # the foot's markers but the heel's
+            reference[m.label]
+            for m in marker_set.markers
+            if m.segment == f"foot_{side}" and not m.landmark.startswith("calcaneus")
+            if m.label in reference
+        ]
+        if not missing or hips is None or heel is None or not front:
             continue
         knee = _joint("knee", f"thigh_{side}", f"shank_{side}", marker_set, reference, trials)
         ankle = _joint("ankle", f"shank_{side}", f"foot_{side}", marker_set, reference, trials)
         if knee is None or ankle is None:
             continue
         above = knee.nearest_to(hips[side], heel)
-        middle = {"malleolus": ankle.in_plane(heel, forefoot, above)}
+        middle = {"malleolus": ankle.in_plane(heel, np.mean(front, axis=0), above)}
         middle["knee"] = knee.nearest_to(hips[side], middle["malleolus"])
         right = hips["r"] - hips["l"]
         outward = knee.axis * np.sign(knee.axis @ right) * (1.0 if side == "r" else -1.0)
         for name, centre in middle.items():
             found[f"{name}_lateral_{side}"] = centre + _HALF_M * outward
             found[f"{name}_medial_{side}"] = centre - _HALF_M * outward
-        notes += [_note(f"knee_{side}", knee), _note(f"ankle_{side}", ankle)]
+        notes += [
+            f"the {in_words(f'{name}_{side}')} has no marker: centre from its movement (turned by "
+            f"up to {np.rad2deg(one.turned_rad):.0f} degrees, {1000 * one.residual_m:.0f} mm)"
+            for name, one in (("knee", knee), ("ankle", ankle))
+        ]
     return found, tuple(notes)
-
-
-def _forefoot(
-    side: str, marker_set: MarkerSet, reference: Mapping[str, np.ndarray]
-) -> np.ndarray | None:
-    """The middle of the foot's markers but the heel's."""
-    places = [
-        reference[m.label]
-        for m in marker_set.markers
-        if m.segment == f"foot_{side}" and not m.landmark.startswith("calcaneus")
-        if m.label in reference
-    ]
-    return np.mean(places, axis=0) if places else None
 
 
 def _joint(
@@ -408,10 +403,3 @@ def _joint(
     if joint is None or joint.residual_m > _LARGEST_RESIDUAL_M:
         return None
     return joint if np.rad2deg(joint.turned_rad) >= _LEAST_TURN_DEG[kind] else None
-
-
-def _note(name: str, joint: FunctionalJoint) -> str:
-    return (
-        f"the {in_words(name)} has no marker: centre from its movement (turned by up to "
-        f"{np.rad2deg(joint.turned_rad):.0f} degrees, {1000 * joint.residual_m:.0f} mm)"
-    )

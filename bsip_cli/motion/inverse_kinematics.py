@@ -83,12 +83,19 @@ def tree_of(person: Person) -> Tree:
     return Tree(arrays, len(skeleton.q_names), nv)
 
 
-def neutral(person: Person) -> np.ndarray:
-    """(nq,) all angles zero, the base at the world's origin."""
-    q = np.zeros(len(person.skeleton.q_names))
-    for start, kind in zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True):
-        if kind != "revolute":
-            q[start + (6 if kind == "free" else 3)] = 1.0
+def neutral(person: Person, turns_rad: np.ndarray | None = None) -> np.ndarray:
+    """(nq,) all angles zero, the base at the world's origin; or every joint but the base's turned
+    by those of the angles (nv,)."""
+    q, skeleton = np.zeros(len(person.skeleton.q_names)), person.skeleton
+    angles = np.zeros(len(skeleton.v_names)) if turns_rad is None else turns_rad
+    joints = zip(skeleton.joint_types, skeleton.q_starts, skeleton.v_starts, strict=True)
+    for kind, at, av in joints:
+        if kind == "free":
+            q[at + 6] = 1.0
+        elif kind == "spherical":
+            q[at : at + 4] = Rotation.from_rotvec(angles[av : av + 3]).as_quat()
+        else:
+            q[at] = angles[av]
     return q
 
 
@@ -169,8 +176,7 @@ def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
     best, least = neutral(person), np.inf
     for k in range(_STARTS):
         turns = rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)) if k else None
-        start = neutral(person) if turns is None else _turned(person, turns)
-        placed = place_base(person, markers_m, start)
+        placed = place_base(person, markers_m, neutral(person, turns))
         poses = solve_poses(person, markers_m[None], placed, **options)
         misfit = float(np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2))
         if misfit < least:
@@ -198,18 +204,6 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     placed[:3] = turn @ q[:3] + shift
     placed[3:7] = Rotation.from_matrix(turn @ R[0, 0]).as_quat()
     return placed
-
-
-def _turned(person: Person, angles_rad: np.ndarray) -> np.ndarray:
-    """(nq,) neutral pose with every joint but the base's turned by some of the angles."""
-    q, skeleton = neutral(person), person.skeleton
-    for i, kind in enumerate(skeleton.joint_types):
-        at, av = skeleton.q_starts[i], skeleton.v_starts[i]
-        if kind == "spherical":
-            q[at : at + 4] = Rotation.from_rotvec(angles_rad[av : av + 3]).as_quat()
-        elif kind == "revolute":
-            q[at] = angles_rad[av]
-    return q
 
 
 def model_markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -121,22 +121,21 @@ def forward(q, tree, R, p):
 
 
 @compiled
-def _residuals(R, p, task, measured, out):
-    """out (m, 3) = measured - model; rows of missing markers are NaN."""
-    for m in range(task.segments.size):
-        s = task.segments[m]
-        for j in range(3):
-            out[m, j] = measured[m, j] - p[s, j]
-            for k in range(3):
-                out[m, j] -= R[s, j, k] * task.positions[m, k]
+def _evaluate(q, tree, task, measured, R, p, residuals):
+    """Pose the model; fill R, p and the residuals (m, 3): measured less model, NaN where missing.
 
-
-@compiled
-def _cost(residuals, q, tree, task):
-    """Half the weighted squares, growing like the logarithm beyond the limit, plus the prior."""
+    Returns the cost: half the weighted squares, growing like the logarithm beyond the limit, plus
+    the prior.
+    """
+    forward(q, tree, R, p)
     total, limit = 0.0, task.limit
     for m in range(task.weights.size):
-        d2 = residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
+        s, r = task.segments[m], residuals[m]
+        for j in range(3):
+            r[j] = measured[m, j] - p[s, j]
+            for k in range(3):
+                r[j] -= R[s, j, k] * task.positions[m, k]
+        d2 = r[0] ** 2 + r[1] ** 2 + r[2] ** 2
         if np.isnan(d2):
             continue
         d = np.sqrt(d2)
@@ -152,14 +151,6 @@ def _cost(residuals, q, tree, task):
         else:
             total += 0.5 * task.prior[av] * q[at] ** 2
     return total
-
-
-@compiled
-def _evaluate(q, tree, task, measured, R, p, residuals):
-    """Pose the model, fill R, p and the residuals, and return the cost."""
-    forward(q, tree, R, p)
-    _residuals(R, p, task, measured, residuals)
-    return _cost(residuals, q, tree, task)
 
 
 @compiled
@@ -232,8 +223,9 @@ def _gather(residuals, measured, base, tree, task, sums):
 
 
 @compiled
-def _assemble(d, w, sums, tree, H, g):
-    """H (nv, nv; only between a velocity and its ancestors) and descent direction g of markers."""
+def _assemble(d, w, sums, q, tree, task, H, g):
+    """H (nv, nv; only between a velocity and its ancestors) and descent direction g of the markers
+    and of the prior, which pulls the joint angles to zero."""
     F, T = np.empty(3), np.empty(3)
     for k in range(g.size):
         i = tree.v_segments[k]
@@ -255,6 +247,17 @@ def _assemble(d, w, sums, tree, H, g):
             for j in range(3):
                 H[k, a] += d[a, j] * F[j] + w[a, j] * T[j]
             a = tree.v_parents[a]
+    turn = np.empty(3)
+    for i in range(1, tree.kinds.size):
+        at, av = tree.q_starts[i], tree.v_starts[i]
+        if tree.kinds[i] == SPHERICAL:
+            _rotation_vector(q[at : at + 4], turn)
+            for j in range(3):
+                H[av + j, av + j] += task.prior[av + j]
+                g[av + j] -= task.prior[av + j] * turn[j]
+        else:
+            H[av, av] += task.prior[av]
+            g[av] -= task.prior[av] * q[at]
 
 
 @compiled
@@ -285,22 +288,6 @@ def _bend(d, w, sums, tree, N, H):
                 for j in range(3):
                     H[k, a] -= 0.5 * (w[a, j] * N[k, j] + w[k, j] * N[a, j])
             a = tree.v_parents[a]
-
-
-@compiled
-def _add_prior(q, tree, task, H, g):
-    """Pull the joint angles to zero."""
-    turn = np.empty(3)
-    for i in range(1, tree.kinds.size):
-        at, av = tree.q_starts[i], tree.v_starts[i]
-        if tree.kinds[i] == SPHERICAL:
-            _rotation_vector(q[at : at + 4], turn)
-            for j in range(3):
-                H[av + j, av + j] += task.prior[av + j]
-                g[av + j] -= task.prior[av + j] * turn[j]
-        else:
-            H[av, av] += task.prior[av]
-            g[av] -= task.prior[av] * q[at]
 
 
 @compiled
@@ -394,8 +381,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     for step in range(max_steps):
         _columns(R, p, tree, d, w)
         _gather(residuals, measured, p[0], tree, task, sums)
-        _assemble(d, w, sums, tree, H, g)
-        _add_prior(q, tree, task, H, g)
+        _assemble(d, w, sums, q, tree, task, H, g)
         base, trial_cost = R[0].copy(), np.inf
         newton = step > 0 and damping == 0.0  # near the optimum: quadratic convergence
         if newton:
@@ -410,8 +396,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
                 if trial_cost <= cost * (1 + 1e-14):
                     break
             if newton:  # its matrix does not help here
-                _assemble(d, w, sums, tree, H, g)
-                _add_prior(q, tree, task, H, g)
+                _assemble(d, w, sums, q, tree, task, H, g)
                 newton = False
             else:
                 damping = max(10 * damping, 1e-4)
@@ -426,8 +411,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         if gain <= 1e-9 * cost + 1e-14 or np.max(np.abs(dv)) < 1e-8:
             taken = step + 1
             break
-    _assemble(d, w, sums, tree, H, g)
-    _add_prior(q, tree, task, H, g)
+    _assemble(d, w, sums, q, tree, task, H, g)
     _factor(H, 0.0, tree.v_parents, L)
     return taken
 

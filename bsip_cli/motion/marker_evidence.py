@@ -26,6 +26,7 @@ reported, with the distance it moved by on its segment and not the smaller resid
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -249,8 +250,7 @@ _LEAST_RESPONSE = 0.003  # what follows a slip by less says nothing of it
 _MOST = 12
 
 
-@dataclass(frozen=True)
-class _Found:
+class _Found(NamedTuple):
     """A change of level of marker ``m`` at a block."""
 
     m: int
@@ -258,8 +258,7 @@ class _Found:
     block: int
 
 
-@dataclass(frozen=True, eq=False)
-class _Slip:
+class _Slip(NamedTuple):
     m: int
     frame: int
     vector: np.ndarray
@@ -369,14 +368,9 @@ def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
     while waiting:
         slip = waiting.pop(0)
         size = float(np.linalg.norm(slip.vector))
-        back = [
-            other
-            for other in waiting
-            if other.m == slip.m and np.linalg.norm(slip.vector + other.vector) < 0.5 * size
-        ]
-        kind, stop = ("jump", back[0].frame) if back else ("slip", len(fit.times_s))
-        if back:
-            waiting.remove(back[0])
+        sums = ((k, one.m, slip.vector + one.vector) for k, one in enumerate(waiting))
+        back = [k for k, m, sum_ in sums if m == slip.m and np.linalg.norm(sum_) < 0.5 * size]
+        kind, stop = ("jump", waiting.pop(back[0]).frame) if back else ("slip", len(fit.times_s))
         frames = slice(slip.frame, stop)
         events.append(event(fit, kind, slip.m, frames, size, slip.z))  # type: ignore[arg-type]
     return events

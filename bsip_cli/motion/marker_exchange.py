@@ -47,7 +47,7 @@ class Labelling:
 
 def as_recorded(fit: MarkerFit) -> Labelling:
     """Every marker under its own label."""
-    return Labelling(fit, np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1)))
+    return Labelling(fit, _order(fit, ()))
 
 
 def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -84,7 +84,12 @@ def put_right(
             break
         kept, again = nearer, refitted(fit, refit, nearer)
     done = nearer if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()) else []
-    events = [_event(fit, one, one in done) for one in suspected]
+    events = []
+    for one in suspected:
+        a, b = (fit.measured_m[one.frames, m] for m in (one.a, one.b))
+        apart = float(np.nanmedian(np.linalg.norm(a - b, axis=1)))
+        how = (one.frames, apart, one.statistic)
+        events.append(event(fit, "swap", one.a, *how, partner=one.b, put_right=one in done))
     return Labelling(
         again if done else fit,
         exchanged(labelling.order, _order(fit, done)),
@@ -111,14 +116,6 @@ def _comes_nearer(one: Exchange, before: MarkerFit, after: MarkerFit) -> bool:
     )
     limit = 3**0.5 * float(before.trusted_m.min())  # trusted in each of three directions
     return all(near < max(far, limit) for near, far in zip(now, was, strict=True))
-
-
-def _event(fit: MarkerFit, one: Exchange, undone: bool) -> MarkerEvent:
-    line = fit.measured_m[one.frames, one.a] - fit.measured_m[one.frames, one.b]
-    apart = float(np.nanmedian(np.linalg.norm(line, axis=1)))
-    return event(
-        fit, "swap", one.a, one.frames, apart, one.statistic, partner=one.b, put_right=undone
-    )
 
 
 # --- pairs of markers that bear each other's labels for a while or throughout ---------------------

@@ -157,6 +157,9 @@ def _total_cost(poses, person, x, precision, options, ik) -> float:
 # --- the parameters ---------------------------------------------------------------------------
 
 
+_ENDS = ("parent", "child")
+
+
 def _children(person: Person, segment: int) -> list[int]:
     return [i for i, parent in enumerate(person.skeleton.parents) if parent == segment]
 
@@ -218,9 +221,7 @@ def _prior_precision(
 def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:
     """The person with the parameters' changes ``x`` added to the first guess."""
     joints, origins = person.joint_in_parent_m.copy(), person.origin_in_joint_m.copy()
-    tilts = {
-        f"{one}_tilt": getattr(person, f"{one}_tilt_rad").copy() for one in ("parent", "child")
-    }
+    tilts = {f"{one}_tilt_rad": getattr(person, f"{one}_tilt_rad").copy() for one in _ENDS}
     places, lengths = person.marker_positions_m.copy(), person.lengths_m.copy()
     for parameter, value in zip(parameters, x, strict=True):
         i, axis = parameter.index, parameter.axis
@@ -231,8 +232,8 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
             origins[i, axis] += value
         elif parameter.kind == "joint":
             joints[i, axis] += value
-        elif parameter.kind in tilts:
-            tilts[parameter.kind][i] += value
+        elif f"{parameter.kind}_rad" in tilts:
+            tilts[f"{parameter.kind}_rad"][i] += value
         elif parameter.kind == "shift":
             places[person.marker_segments == i, axis] += value
             for child in _moving_joints(person, i):
@@ -249,9 +250,8 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
         joint_in_parent_m=joints,
         origin_in_joint_m=origins,
         lengths_m=lengths,
-        parent_tilt_rad=tilts["parent_tilt"],
-        child_tilt_rad=tilts["child_tilt"],
         marker_positions_m=places,
+        **tilts,
     )
 
 

@@ -274,12 +274,9 @@ def _imaginary(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def _linear(s: SmoothSignal, part: slice, quaternion: np.ndarray, omega: np.ndarray):
     """Velocity and acceleration of the base in its own axes (Pinocchio's spatial ones)."""
-    velocity = _into_body(quaternion, s.first[:, part])
-    acceleration = _into_body(quaternion, s.second[:, part]) - np.cross(omega, velocity)
-    return velocity, acceleration, s.second_sd[:, part]
-
-
-def _into_body(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    u, w = -quaternion[:, :3], quaternion[:, 3:]
-    t = 2 * np.cross(u, vectors)
-    return vectors + w * t + np.cross(u, t)
+    u, w, in_body = -quaternion[:, :3], quaternion[:, 3:], []
+    for vectors in (s.first[:, part], s.second[:, part]):
+        t = 2 * np.cross(u, vectors)
+        in_body.append(vectors + w * t + np.cross(u, t))
+    velocity, acceleration = in_body
+    return velocity, acceleration - np.cross(omega, velocity), s.second_sd[:, part]

@@ -10,8 +10,8 @@ from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.c3d_content import Content
 from bsip_cli.recordings.c3d_format import Group, number, numbers, texts, whole_numbers
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.plate_of_c3d import C3dPlate
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import (
     CHANNELS_OF,
     PlateDescription,

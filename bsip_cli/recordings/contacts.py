@@ -259,7 +259,7 @@ def _vertical_forces(
     total_force_z_N: np.ndarray, trunk_markers_m: np.ndarray, mass_kg: float, rate_hz: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """What the plates measure, and what the trunk's motion needs, (n_frames,) each."""
-    reach = _reach_m_s2(trunk_markers_m, rate_hz)
+    reach = reach_m_s2(trunk_markers_m, rate_hz)
     return None if reach is None else (low_pass(total_force_z_N, rate_hz), mass_kg * reach)
 
 
@@ -292,7 +292,7 @@ def agreeing_mass(
     Only good enough to find frames in which something else bears the person; the largest, because
     what bears a person takes weight off the plates. None without load or trunk markers.
     """
-    reach = _reach_m_s2(trunk_markers_m, rate_hz)
+    reach = reach_m_s2(trunk_markers_m, rate_hz)
     if reach is None:
         return None
     measured = low_pass(total_force_z_N, rate_hz)
@@ -306,7 +306,7 @@ def agreeing_mass(
     return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
 
 
-def _reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:
+def reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:
     """Gravity and the vertical acceleration of the markers' mean (n_frames, k, 3), low-passed,
     (n_frames,)."""
     height = mean_path(trunk_markers_m[..., 2])

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import accumulate, chain, pairwise
 
-from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.config import shipped
 from bsip_cli.recordings.labels import affixes, owner, split
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import LANDMARKS, SEGMENTS
 
 _COMMON = "common"
 _CLUSTER = 3  # labels that differ by a number only: a cluster, none of which marks a bone

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.body.landmarks import JOINT_CENTRES, LANDMARKS
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set, shipped_names
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.label_words import bones, meanings
@@ -25,7 +24,7 @@ from bsip_cli.recordings.labels import (
     spelling_of,
 )
 from bsip_cli.recordings.model import Finding
-from bsip_cli.segments import SEGMENTS, TRUNK, in_words
+from bsip_cli.segments import JOINT_CENTRES, LANDMARKS, SEGMENTS, TRUNK, in_words
 
 _ENOUGH = 0.5  # of a set's markers, its optional ones aside
 _MOSTLY, _LEAST = 0.75, 10  # or of the labels, when these are at least so many: half a body

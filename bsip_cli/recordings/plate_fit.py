@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.recordings.body_motion import INDEPENDENT_S
+from bsip_cli.recordings.plate_of_table import ForceOnPoint
 from bsip_cli.recordings.plate_reading import AS_STATED, PlateReading
-from bsip_cli.recordings.plate_source import ForceOnPoint, PlateSource
+from bsip_cli.recordings.plate_source import PlateSource
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import (
     Evidence,

@@ -38,7 +38,8 @@ class PlateReading:
 
     Attributes
     ----------
-    moment_scale, point_scale : what moments and points are multiplied with.
+    moment_scale, point_scale : what moments and points are multiplied with; of a plate of type 1
+        the first counts for the vertical moment, its sign for the points too.
     about : what moments are about. "stated": what the file says, in a MOT the point; "reversed" and
         "centred": ORIGIN the other way or without its part along the surface; "origin": the lab's
         origin; "fixed": one point, ``centre_m``, for all samples.
@@ -85,8 +86,8 @@ class PlateReading:
         """The same of what a plate of a C3D has measured (`plates.measured`), (k, k), where its own
         channels are no forces and moments of the whole plate."""
         if kind == 1:
-            points = self.channel_matrix(POINT)
-            return np.asarray(block_diag(np.eye(3), np.kron(points, np.eye(3)), 1.0))
+            points = np.sign(self.moment_scale) * self.point_scale * self.channel_matrix(POINT)
+            return np.asarray(block_diag(np.eye(3), np.kron(points, np.eye(3)), self.moment_scale))
         own = CHANNELS_OF[kind]
         return np.eye(len(own)) if own == CHANNELS else self.channel_matrix(own)
 
@@ -132,6 +133,8 @@ _MOMENT_SCALES = {
 _POINT_SCALES = {
     1e-3: "read the points of force in mm",
     1e-2: "read the points of force in cm",
+    1e1: "read the points of force in cm",
+    1e3: "read the points of force in m",
 }
 _ABOUT = {
     "stated": "",

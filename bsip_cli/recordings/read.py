@@ -10,17 +10,21 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
+from bsip_cli.recordings.contacts import low_pass, reach_m_s2
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.scene import handedness
+from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.settle import AGAINST, SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
+from bsip_cli.recordings.zero import steady_pull
+from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
 _LIGHTLY_LOADED_N = 20.0
@@ -29,6 +33,8 @@ _WINDOW_S = 0.1
 _QUIET_SHARE = 0.05  # of the mean load: more is movement, in which both feet press at once
 _LEAST_CHANGE_N = 1.0
 _TOGETHER = 0.8  # correlation
+_MOSTLY_BORNE = 75  # per cent of the time, or less, in which less than the weight is on the plates
+_BORNE = 0.2  # of the weight: a standing person's total changes less
 _UNLOADED = Verdict()
 _TRIED = (
     "other units, other points that moments are about, corners in another order, reversed and "
@@ -108,7 +114,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
                 continue
             source = source.in_place_of(by_name[other])
         plate = source.plate(verdict.reading)
-        if fault := _no_person(plate):
+        if fault := _no_person(plate, recording.analog_rate_hz):
             findings.append(fault)
             missing.append(source)
             continue
@@ -121,6 +127,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     findings += about
     findings += sign_doubts(plates, reversed_names, recording.analog_rate_hz)
     note = why_no_forces(plates, bool(opened.sources))
+    note = note or lost_zeros(plates, reversed_names, recording)
     return replace(
         recording,
         plates=() if note else tuple(plates),
@@ -266,15 +273,16 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
         if not total.any():
             return found
         return (
-            f"{found}; if these are kN or parts of the weight, export them in N; if the plates "
-            "were set to zero under the person, record again"
+            f"{found}; if these are kN, kgf or parts of the weight, export them in N; if the "
+            "plates were set to zero under the person, record again"
         )
     return ""
 
 
-def _no_person(plate: Plate) -> Finding | None:
-    """Why a plate's forces in this trial are no person's."""
-    lift = plate.force_N[plate.usable, 2]
+def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
+    """Why a plate's forces in this trial are no person's, even from another zero."""
+    pulled = steady_pull(plate, rate_hz)
+    lift = plate.force_N[plate.usable, 2] - (plate.force_N[pulled, 2].mean() if pulled.any() else 0)
     if not len(lift):
         return None
     largest = np.percentile(np.abs(lift), 99.5)
@@ -332,6 +340,39 @@ def sign_doubts(
         action = "kept it reversed; if its zero is lost instead, its load and the sum are wrong"
         findings.append(Finding("plate_sign", plate.name, found, expected, action, "warning"))
     return findings
+
+
+def lost_zeros(plates: Sequence[Plate], reversed_names: list[str], recording: Recording) -> str:
+    """Empty, or that the plates were set to zero under the person.
+
+    Then a plate that somebody leaves reads a pull, as one does whose sign is the other one; but
+    reversed, all plates together go less with the motion of the trunk than as recorded.
+    """
+    segments = by_segment(recording.labels, recording.markers_m)
+    trunk = [segments[name] for name in TRUNK if name in segments]
+    if not trunk or not 0 < len(reversed_names) < len(plates):
+        return ""
+    reach = reach_m_s2(np.concatenate(trunk, axis=1), recording.marker_rate_hz)
+    if reach is None:
+        return ""
+    frames = np.arange(recording.n_frames) / recording.marker_rate_hz
+    times = np.arange(len(plates[0].usable)) / recording.analog_rate_hz
+    lifts = [np.where(plate.usable, plate.force_N[:, 2], 0.0) for plate in plates]
+    smooth = [low_pass(np.interp(frames, times, lift), recording.marker_rate_hz) for lift in lifts]
+    total = np.sum(smooth, axis=0)
+    signs = [-1 if plate.name in reversed_names else 1 for plate in plates]
+    recorded = np.einsum("p,pn->n", signs, smooth)
+    weight = np.percentile(total, _MOSTLY_BORNE)
+    needed = weight / GRAVITY_M_S2 * reach
+    if np.var(total - needed) < max(2.0 * np.var(recorded - needed), (_BORNE * weight) ** 2):
+        return ""
+    some = " and ".join(reversed_names)
+    return (
+        f"plate {some} pulls, and reversed it makes all plates together read from "
+        f"{total.min():.0f} to {total.max():.0f} N of a person whose trunk hardly rises or falls, "
+        f"as recorded the same throughout to {np.std(recorded):.0f} N: the plates were set to zero "
+        "under the person; record again, with the plates set to zero while nobody stands on them"
+    )
 
 
 def _about(name: str, found: str, action: str, level: str) -> Finding:

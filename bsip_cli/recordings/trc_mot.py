@@ -13,8 +13,9 @@ from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
+from bsip_cli.recordings.plate_of_table import ForceOnPoint, points_that_move
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.plate_source import ForceOnPoint, Opened, points_that_move
+from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.timebase import (
     FRAMES,

@@ -10,7 +10,7 @@ import numpy as np
 from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Body, GateLimits
 from bsip_cli.recordings.clock import lags
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.plate_reading import FrameChange
+from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
@@ -44,8 +44,7 @@ class TrialSamples:
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = cls._of(opened)
-        seen = lags(opened, limits) if stated.sources else None
-        delay_s = 0.0 if seen is None else seen.delay_s(limits)
+        delay_s = _delay_s(opened, stated.hands, limits) if stated.sources else 0.0
         if not delay_s:
             return stated
         late = cls._of(opened.with_forces_from(delay_s))
@@ -95,6 +94,19 @@ class TrialSamples:
             )
             changed = replace(changed, sources=sources, smooth=smooth)
         return changed
+
+
+def _delay_s(opened: Opened, hands: Handedness, limits: GateLimits) -> float:
+    """Of the forces after the body; in other axes where none makes them go together as stated."""
+    best = lags(opened, limits)
+    if best is None:
+        return 0.0
+    if best.log_likelihood.max() <= 0.0:
+        for change in MIRRORS if hands.is_mirrored else FORCES_MOVED:
+            one = lags(opened.in_frame(change), limits)
+            if one is not None and one.log_likelihood.max() > best.log_likelihood.max():
+                best = one
+    return best.delay_s(limits)
 
 
 def _heavy(lift_N: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from bsip_cli.recordings.analog import long_runs, runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
@@ -15,6 +15,7 @@ _WINDOW_S = 0.2
 _LEAST_S = 0.4
 _LARGEST_N = 45.0
 _QUIET_N = 5.0  # slow changes
+_PULLED_S = 0.2  # a foot that stays on a plate does not bear the same so long
 _PULL_N = -20.0
 _HEAVIEST_N = 2500.0  # nobody stands on one plate so heavily
 _LOW_M = 0.3  # above the plate: whoever stands on it has a marker below this height
@@ -38,8 +39,11 @@ class PlateZero:
 def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = None) -> PlateZero:
     """Find unloaded stretches: long, low and quiet in the vertical force.
 
-    The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near.
+    The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near, or the
+    plate reads a steady pull: it was set to zero under the person.
     """
+    if (pulled := steady_pull(plate, rate_hz)).any():
+        return _zero_of(plate, pulled, rate_hz)
     width = max(1, round(_WINDOW_S * rate_hz))
     mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
     is_quiet = plate.usable & (np.abs(mean - uniform_filter1d(mean, width)) < _QUIET_N)
@@ -51,6 +55,20 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
     unloaded = long_runs(unloaded, max(2, round(_LEAST_S * rate_hz)))
     if not unloaded.any():
         return PlateZero(np.zeros(6), 0, ())
+    return _zero_of(plate, unloaded, rate_hz)
+
+
+def steady_pull(plate: Plate, rate_hz: float) -> np.ndarray:
+    """Samples at which it pulls most, and hardly changes for long, (n_analog,) bool."""
+    width = max(1, round(0.25 * _PULLED_S * rate_hz))
+    mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
+    spread = maximum_filter1d(mean, width) - minimum_filter1d(mean, width)
+    lowest = min(np.percentile(mean, 1), -_LARGEST_N)
+    pulls = plate.usable & (spread < _QUIET_N) & (mean < lowest + _QUIET_N)
+    return long_runs(pulls, max(2, round(_PULLED_S * rate_hz)))
+
+
+def _zero_of(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> PlateZero:
     samples = plate.wrench()[unloaded]
     return PlateZero(
         offset=np.median(samples, axis=0),

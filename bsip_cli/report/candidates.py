@@ -5,9 +5,12 @@ might have been and still been seen.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from math import isfinite
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,16 +27,15 @@ from bsip_cli.report.effect_words import (
     unnamed_label,
     usual_words,
 )
-from bsip_cli.report.words import capital, number
+from bsip_cli.report.words import capital, number, true_minus
 
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
-_ADVICE = re.compile(r"; ([^;]* look alike here: )?to tell them apart, .*$")
+_ADVICE = re.compile(r"; ([^;]* look alike here: )?to distinguish them, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
 _OF_ALL = "; this is known from the laboratory"
 _REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
-_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 _SIGNED = re.compile(r"[+−]\d")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
 
@@ -103,7 +105,7 @@ class Candidate:
         text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence))
         text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
-        return re.sub(_MINUS, "−", text)
+        return true_minus(text)
 
     def told(self, remarks: bool = True) -> str:
         """Its sentence with the interval of its main number, and what the markers alone say."""
@@ -146,15 +148,16 @@ class Candidate:
 
 def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
     """The candidates of a ``diagnosis`` table in their order; the row ``none`` is none."""
-    rows = diagnosis[diagnosis["effect"] != NOTHING]
-    return tuple(_candidate(group) for _, group in rows.groupby("rank", sort=True))
+    rows = diagnosis[diagnosis["effect"] != NOTHING].sort_values("rank", kind="stable")
+    by_rank = groupby(rows.to_dict("records"), itemgetter("rank"))
+    return tuple(_candidate(list(group)) for _, group in by_rank)
 
 
-def _candidate(rows: pd.DataFrame) -> Candidate:
-    first = rows.iloc[0]
+def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
+    first = rows[0]
     numbers = tuple(
         Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
-        for r in rows.to_dict("records")
+        for r in rows
         if r["parameter"]
     )
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))
@@ -187,6 +190,11 @@ def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], .
         return not is_large(cause), -float(np.nansum(expected))
 
     return tuple(sorted(map(tuple, groups.values()), key=importance))
+
+
+def effects_in(causes: Iterable[Sequence[Candidate]]) -> frozenset[str]:
+    """Names of all effects that were found."""
+    return frozenset(one.effect for cause in causes for one in cause)
 
 
 def is_large(cause: Sequence[Candidate]) -> bool:
@@ -254,7 +262,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     return f"{capital(text)} might have gone unseen."
 
 
-def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
+def analysed(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
     """Stems of the recordings that were diagnosed, those of which something was told before the
     search too."""
     told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]

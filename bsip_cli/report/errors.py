@@ -3,7 +3,7 @@ one number; how large they are beside yardsticks; what makes them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -279,6 +279,7 @@ _WORDS = {
     "unknown": UNKNOWN,
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
+_LEAST = 0.5  # less is nothing
 LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
@@ -290,50 +291,51 @@ class Piece:
     share: float
 
 
-def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
-    """The largest first; what is small together, then unknown and noise. Their sum is 100."""
-    whole = (budget["trial"] == trial) & (budget["target"] == "")
-    return _cut(budget[whole & (budget["component"] == component)].set_index("term"))
+def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tuple[Piece, ...]:
+    """Of all trials together, the largest first; what is small together, then unknown and noise.
+    Their sum is 100. ``found``: the effects that a diagnosis reports."""
+    whole = (budget["trial"] == "") & (budget["target"] == "")
+    return _cut(budget[whole & (budget["component"] == component)].set_index("term"), found)
 
 
-def overall_pieces(budget: pd.DataFrame) -> tuple[Piece, ...]:
-    """Of all trials, the mean over the vertical force and both directions of the centre of pressure,
-    as far as their errors are of interest; terms that look alike in one count together in all."""
+def overall_pieces(budget: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
+    """The same of the mean over the vertical force and both directions of the centre of pressure,
+    as far as their errors are of interest; terms that look alike in one count together in all, and
+    what rounds to nothing is left out."""
     shares = _overall(budget)
-    return () if shares.empty else _cut(shares)
+    whole = () if shares.empty else _cut(shares, found)
+    return tuple(one for one in whole if abs(one.share) >= _LEAST)
 
 
-def fault_share(budget: pd.DataFrame) -> float:
-    """Of the same error, what faults make [%]; NaN where no error is of interest."""
+def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
+    """Of the same error, what the effects found make [%]; NaN where no error is of interest."""
     shares = _overall(budget)
-    faults = shares.index.astype(str).str.startswith(_FAULT)
-    return float(shares.loc[faults, "share_percent"].sum()) if len(shares) else np.nan
+    mine = shares.index.isin([f"{_FAULT}{effect}" for effect in found])
+    return float(shares.loc[mine, "share_percent"].sum()) if len(shares) else np.nan
 
 
 def _overall(budget: pd.DataFrame) -> pd.DataFrame:
-    told = [one for one in FIRST if size_of(budget, "", one)[0] >= LEAST_TOLD_SIZE]
+    told = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_TOLD_SIZE]
     mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
     by_term = mine[mine["component"].isin(told)].groupby("term", sort=False)
     alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
     return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
 
 
-def _cut(rows: pd.DataFrame) -> tuple[Piece, ...]:
+def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     """What was found has its own piece, however small."""
-    groups = list(_groups(rows))
-    labels = (" or ".join(dict.fromkeys(map(term_words, terms))) for terms in groups)
-    shares = (float(rows.loc[list(terms), "share_percent"].sum()) for terms in groups)
-    found = list(map(Piece, labels, shares))
-    least = [0.5 if terms[0].startswith(_FAULT) else _WORTH for terms in groups]
-    large = [
-        one
-        for one, size in zip(found, least, strict=True)
-        if (one.share >= size or one.share <= -_WORTH) and one.label not in _LAST
-    ]
+    large, last = [], []
+    for terms in _groups(rows):
+        label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
+        piece = Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
+        least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
+        if label in _LAST:
+            last.append(piece)
+        elif piece.share >= least or piece.share <= -_WORTH:
+            large.append(piece)
     large.sort(key=lambda one: -one.share)
-    last = [one for one in found if one.label in _LAST]
     others = 100.0 - sum(one.share for one in (*large, *last))
-    rest = [Piece(REST, others)] if abs(others) >= 0.5 else []
+    rest = [Piece(REST, others)] if abs(others) >= _LEAST else []
     return (*large, *rest, *last)
 
 
@@ -356,33 +358,37 @@ def term_words(term: str) -> str:
     return _WORDS[term]
 
 
-def size_of(budget: pd.DataFrame, trial: str, component: str) -> tuple[float, str]:
-    """RM's error of a component, and its unit."""
-    row = _total(budget, trial, component)
+def _label(term: str, found: Collection[str]) -> str:
+    """A fault that is not reported has only the share that it may have."""
+    unsure = term.startswith(_FAULT) and term.removeprefix(_FAULT) not in found
+    return f"{'perhaps ' if unsure else ''}{term_words(term)}"
+
+
+def size_of(budget: pd.DataFrame, component: str) -> tuple[float, str]:
+    """RM's error of a component in all trials together, and its unit."""
+    row = _total(budget, component)
     return (np.nan, "") if row is None else (float(row["rms"]), str(row["unit"]))
 
 
-def _total(budget: pd.DataFrame, trial: str, component: str) -> pd.Series | None:
-    mine = (budget["trial"] == trial) & (budget["component"] == component)
+def _total(budget: pd.DataFrame, component: str) -> pd.Series | None:
+    mine = (budget["trial"] == "") & (budget["component"] == component)
     rows = budget[mine & (budget["term"] == "total")]
     return None if rows.empty else rows.iloc[0]
 
 
-def budget_sentences(budget: pd.DataFrame) -> tuple[str, ...]:
+def budget_sentences(budget: pd.DataFrame, found: Collection[str]) -> tuple[str, ...]:
     """What makes RM's error in all trials together, one component each, and what that is worth on
     data held out."""
-    if budget.empty:
-        return ()
-    return tuple(filter(None, (_sentence(budget, component) for component in FIRST)))
+    return tuple(filter(None, (_sentence(budget, component, found) for component in FIRST)))
 
 
-def _sentence(budget: pd.DataFrame, component: str) -> str:
-    size, unit = size_of(budget, "", component)
-    if not size >= LEAST_TOLD_SIZE:
+def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> str:
+    size, unit = size_of(budget, component)
+    total = _total(budget, component)
+    if total is None or not size >= LEAST_TOLD_SIZE:
         return ""
-    parts = [f"{one.label} {number(one.share, 0)} %" for one in pieces(budget, "", component)]
-    total = _total(budget, "", component)
-    assert total is not None
+    shares = pieces(budget, component, found)
+    parts = [f"{one.label} {number(one.share, 0)} %" for one in shares]
     worth = ""
     if np.isfinite(total["gain_percent"]):
         change, low, high = (

@@ -23,11 +23,9 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
-    Candidate,
-    candidates_of,
-    causes_of,
+    analysed,
+    effects_in,
     is_large,
-    looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.errors import (
@@ -50,7 +48,7 @@ from bsip_cli.report.verdict import (
     light_of,
     unseen,
 )
-from bsip_cli.report.words import capital, count, listing, number
+from bsip_cli.report.words import METHODS, capital, count, listing, number
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -74,13 +72,13 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *portrait(record),
         Terms((*who(record),)),
         Heading("Is anything wrong?"),
-        replace(light, text="") if _found(record) and large_errors(record) else light,
+        replace(light, text="") if record.causes and large_errors(record) else light,
         Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
+        Paragraph(f"Root mean square (RMS), with {METHODS[record.use()]}. {SOURCES}", "note"),
         *_sure(record, light),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
@@ -157,16 +155,12 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _found(record: ParticipantRecord) -> tuple[tuple[Candidate, ...], ...]:
-    return () if record.diagnosis is None else causes_of(candidates_of(record.diagnosis))
-
-
 def _causes(record: ParticipantRecord) -> Iterator[Block]:
     """A line per cause that was found, the most probable first."""
     if record.diagnosis is None or record.detection is None:
         return
-    everywhere = looked_at(record.detection, record.diagnosis)
-    lines = tuple(cause_line(cause, everywhere) for cause in _found(record))
+    everywhere = analysed(record.detection, record.diagnosis)
+    lines = tuple(cause_line(cause, everywhere) for cause in record.causes)
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
@@ -181,12 +175,10 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
         return
     said = []
     if light.state == "large":
-        cause = (
-            "its cause is not known" if CAUSE_UNKNOWN in light.title else "its causes are estimates"
-        )
-        said.append(f"That the error is large is certain; {cause}.")
-    if any(not is_large(cause) for cause in _found(record)):
-        said.append("Each cause found states its own probability.")
+        unknown = ", its cause is not known" if CAUSE_UNKNOWN in light.title else ""
+        said.append(f"That the error is large is certain{unknown}.")
+    if any(not is_large(cause) for cause in record.causes):
+        said.append("Each finding states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")
@@ -195,10 +187,12 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
 
 def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
     """What makes the error of the table's parameters, as one bar."""
-    if record.budget is not None and (pieces := overall_pieces(record.budget)):
+    if record.budget is None:
+        return
+    if pieces := overall_pieces(record.budget, effects_in(record.causes)):
         yield Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
-            tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
+            tuple((piece.label, piece.share) for piece in pieces),
         )
 
 
@@ -218,7 +212,7 @@ def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...
 
 def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     """Whether the data may be used, and at most two things to do."""
-    causes = _found(record)
+    causes = record.causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said = [_USABLE[light.state], *said]
     said += consequences(causes[:_MOST], only_actions=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import pandas as pd
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Terms
+from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
 from bsip_cli.statistics.methods import MEASURED, RM, is_extended
 
@@ -87,6 +89,11 @@ class ParticipantRecord:
     changes: pd.DataFrame | None = None
     choice: pd.DataFrame | None = None
 
+    @cached_property
+    def causes(self) -> tuple[tuple[Candidate, ...], ...]:
+        """What the diagnosis found; nothing where none was made."""
+        return () if self.diagnosis is None else causes_of(candidates_of(self.diagnosis))
+
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])
 
@@ -143,16 +150,19 @@ def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarra
     }
 
 
+def measured_of(reconstruction: pd.DataFrame) -> pd.DataFrame:
+    """The measured rows, one for each time."""
+    return reconstruction[reconstruction["method"] == MEASURED].drop_duplicates("time_s")
+
+
 def clock_of(reconstruction: pd.DataFrame) -> np.ndarray:
     """Times [s] of the measured rows."""
-    times = reconstruction.loc[reconstruction["method"] == MEASURED, "time_s"]
-    return times.drop_duplicates().to_numpy()
+    return measured_of(reconstruction)["time_s"].to_numpy()
 
 
 def flags_of(reconstruction: pd.DataFrame, column: str) -> np.ndarray:
     """A flag of the measured rows over time."""
-    measured = reconstruction[reconstruction["method"] == MEASURED]
-    return measured.drop_duplicates("time_s")[column].to_numpy(dtype=bool)
+    return measured_of(reconstruction)[column].to_numpy(dtype=bool)
 
 
 # --- how it was made ------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +15,13 @@ from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
     Candidate,
+    analysed,
     candidates_of,
     causes_of,
+    effects_in,
     is_large,
     limits_of,
     limits_sentence,
-    looked_at,
 )
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
@@ -34,10 +35,11 @@ from bsip_cli.report.errors import (
     REST,
     UNKNOWN,
     budget_sentences,
-    fault_share,
+    found_share,
     overall_pieces,
 )
 from bsip_cli.report.words import (
+    METHODS,
     capital,
     component_label,
     count,
@@ -106,7 +108,7 @@ def verdict_of(
     ``gain`` and ``bsip-change``, with one method each. ``budget``: ``overall-error-budget``, where
     it is known."""
     causes = causes_of(candidates_of(diagnosis))
-    everywhere = looked_at(detection, diagnosis)
+    everywhere = analysed(detection, diagnosis)
     light = light_of(diagnosis, detection, budget)
     names = [trial_label(stem) for stem in everywhere]
     return Verdict(
@@ -114,9 +116,9 @@ def verdict_of(
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
-            *(budget_sentences(budget) if budget is not None else ()),
+            *(budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
-            *([f"Recordings looked at: {listing(names)}."] if names else ()),
+            *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         unseen(detection, diagnosis),
@@ -148,17 +150,19 @@ def light_of(
     unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
-    looked = count(len(looked_at(detection, diagnosis)), "recording")
+    looked = count(len(analysed(detection, diagnosis)), "recording")
     nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
-        title = "; ".join(filter(None, (f"Large error{mostly(budget, use)}", found)))
-        said = f"Large with {use}: {listing(large)}." if large else ""
+        besides = "besides it " if found and any(map(is_large, causes)) else ""
+        error = f"Large error{mostly(budget, effects_in(causes), use)}"
+        title = "; ".join(filter(None, (error, f"{besides}{found}")))
+        said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
     if not causes:
         title = "No fault found" if large is None else "Fine: no fault found, no large error"
         return Light("fine", title, nothing)
-    share = np.nan if budget is None else fault_share(budget)
+    share = np.nan if budget is None else found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
     named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
     title = capital(found) if large is None else f"{capital(found)}; no large error"
@@ -178,10 +182,10 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
     return f"{listing(parts)} found" if parts else ""
 
 
-def mostly(budget: pd.DataFrame | None, use: str = RM) -> str:
+def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    parts = () if budget is None or budget.empty else overall_pieces(budget)
+    parts = () if budget is None or budget.empty else overall_pieces(budget, found)
     most = max(parts, key=lambda one: one.share, default=None)
     if most is None or most.label in (UNKNOWN, REST):
         return f", {CAUSE_UNKNOWN}"
@@ -373,7 +377,7 @@ def change_sentence(changes: pd.DataFrame) -> str:
     )
 
 
-def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
+def corrected_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
     """What ``ik`` has corrected, from (stem, ``marker-events``); nothing where there was nothing."""
     said = [
         f"in {trial_label(stem)} {text.removesuffix('; corrected')}"

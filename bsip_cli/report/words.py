@@ -115,6 +115,11 @@ def capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
+def true_minus(text: str) -> str:
+    """A sentence of the diagnosis with the sign that numbers have here."""
+    return re.sub(r"(?<![\w.)])-(?=\d)", "−", text)
+
+
 def segment_label(segment: str) -> str:
     """``left upper arm`` for upper_arm_l."""
     return in_words(segment)

@@ -50,7 +50,13 @@ def stale_upstream(unit: Unit, participant: Participant | None, stages: Collecti
     before -= {stage.label for stage in stages}
     for stage in STAGES:
         for other in units_of(stage, unit, participant) if stage.label in before else ():
-            why = _untrue(other)
+            refusal, kinds = other.refusal_path(), other.stage.writes
+            if refusal.exists():  # what was refused as it stands, or is not there, is no lie
+                made_by = read_header(refusal, "refusal")["provenance"]["made_by"]
+                why = _differs(made_by, other.made_by)
+            else:
+                there = not other.missing() and any(other.path(kind).exists() for kind in kinds)
+                why = why_stale(other) if there else ""
             if why and why != _MOVED:  # such a person counts in the group all the same
                 return f"what `bsip {stage.name}` made of {other.name} is not up to date ({why})"
     return ""
@@ -63,16 +69,6 @@ def units_of(stage: Stage, like: Unit, participant: Participant | None) -> Itera
     whole = like.study, like.out, like.config_of_all, participant
     for trial in trials:
         yield Unit(stage, *whole, trial, left_out=like.left_out)
-
-
-def _untrue(unit: Unit) -> str:
-    """Why what is there is not true; what is not there, or was refused as it stands, is no lie."""
-    refusal = unit.refusal_path()
-    if refusal.exists():
-        return _differs(read_header(refusal, "refusal")["provenance"]["made_by"], unit.made_by)
-    if unit.missing() or not any(unit.path(kind).exists() for kind in unit.stage.writes):
-        return ""
-    return why_stale(unit)
 
 
 @lru_cache(maxsize=64)

@@ -94,13 +94,6 @@ def leave(exit_code: int) -> NoReturn:
     sys.exit(exit_code)
 
 
-def signal_in(exit_code: int | None) -> int | None:
-    """The signal that ended a process, if one of these did: by itself or as an exit code."""
-    code = exit_code or 0
-    number = -code if code < 0 else code - _SHELL
-    return number if number in ENDING else None
-
-
 @contextmanager
 def endings_wait() -> Iterator[None]:
     """Inside, the signals wait until the end; processes started there begin with them waiting."""
@@ -196,8 +189,9 @@ def _died(worker: _Worker[Task], tidy: Callable[[Task], None]) -> Iterator[Died[
     worker.process.join()
     if worker.task is not None:
         tidy(worker.task)
-    number = signal_in(worker.process.exitcode)
-    if number is not None:
+    code = worker.process.exitcode or 0
+    number = -code if code < 0 else code - _SHELL  # ended by itself, or as an exit code
+    if number in ENDING:
         raise EndedError(number)
     if worker.task is not None:
         yield Died(worker.task, worker.process.exitcode)

@@ -34,7 +34,7 @@ from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
 from bsip_cli.running.processes import Died, end_if_asked, work_on
 from bsip_cli.running.unit import Unit, code_hash, library_versions
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.study.study import Participant, Study, Trial
+from bsip_cli.study.study import Participant, Study
 from bsip_cli.study.trials import listed
 
 LOCK = ".lock"
@@ -91,6 +91,14 @@ class _Task:
     def folder(self) -> Path:
         return self.out / self.name
 
+    def units(self, study: Study, left_out: Mapping[str, str]) -> Iterator[Unit]:
+        """In order."""
+        for stage in self.stages:
+            whole = stage, study, self.out, self.config, self.participant
+            of_trials = self.participant and stage.level == "trial"
+            for trial in self.participant.trials if self.participant and of_trials else (None,):
+                yield Unit(*whole, trial, left_out=left_out)
+
 
 def run_stages(
     stages: tuple[Stage, ...], study: Study, out: Path, config: Config, manner: Manner
@@ -126,7 +134,12 @@ def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]
     """Whose, and what; the end of a process stops nobody else's work."""
     for result in work_on(tasks, _run, jobs, _tidy):
         if isinstance(result, Died):
-            yield result.task.name, _killed(result.task, result.exit_code)
+            task, code = result.task, result.exit_code or 0
+            stage = task.stages[0].name if len({s.name for s in task.stages}) == 1 else "run"
+            ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            killed = code == -signal.SIGKILL
+            how = _SHORT_OF_MEMORY if killed else f"the process crashed ({ending})"
+            yield task.name, Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
         else:
             yield result
 
@@ -142,9 +155,8 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):
-                for stage, trial in _units(task):
-                    name = trial.stem if trial else task.name
-                    yield task.name, Outcome(stage.name, name, "fresh")
+                for unit in task.units(task.study, {}):
+                    yield task.name, Outcome(unit.stage.name, unit.name, "fresh")
                 return
             is_true = True
             for outcome in _run_alone(task):
@@ -197,47 +209,31 @@ def _state(task: _Task) -> str:
     return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
 
 
-def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:
-    for stage in task.stages:
-        trials = task.participant.trials if task.participant and stage.level == "trial" else (None,)
-        yield from ((stage, trial) for trial in trials)
-
-
 def _run_alone(task: _Task) -> Iterator[Outcome]:
-    """Unit by unit; what cannot be written ends it, else the rest would be made without it."""
-    study, left_out = task.study, {}
+    """Unit by unit; what cannot be written ends it, else the rest would be made without it.
+
+    Who is not up to date is left out of the group; and a word is said where stages that are run
+    alone build on what is not.
+    """
+    study, left_out = task.study, dict[str, str]()
     if task.participant is not None:
         _forget_gone_recordings(task.folder, task.participant)
     else:
-        left_out = _stale_people(task)
-        study = Study(
-            study.root, tuple(one for one in study.participants if one.id not in left_out)
-        )
+        like, people = next(task.units(study, {})), study.participants
+        doubtful = (one for one in people if one.id in task.doubtful)
+        found = {one.id: stale_upstream(like, one, task.stages) for one in doubtful}
+        left_out = {name: why for name, why in found.items() if why}
+        study = Study(study.root, tuple(one for one in people if one.id not in left_out))
         yield from _left_out(task, left_out)
-    yield from _behind(task, study, left_out)
-    for stage, trial in _units(task):
-        unit = Unit(stage, study, task.out, task.config, task.participant, trial, left_out=left_out)
+    units = list(task.units(study, left_out))
+    if why := stale_upstream(units[0], task.participant, task.stages):
+        said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
+        yield Outcome(task.stages[0].name, task.name, "noted", said)
+    for unit in units:
         outcome = perform(unit, task.manner.force)
         yield outcome
         if outcome.state == "unwritten":
             return
-
-
-def _behind(task: _Task, study: Study, left_out: Mapping[str, str]) -> Iterator[Outcome]:
-    """A word where stages that are run alone build on what is not up to date."""
-    last = task.stages[-1]
-    unit = Unit(last, study, task.out, task.config, task.participant, left_out=left_out)
-    if why := stale_upstream(unit, task.participant, task.stages):
-        said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
-        yield Outcome(task.stages[0].name, task.name, "noted", said)
-
-
-def _stale_people(task: _Task) -> dict[str, str]:
-    """Participants whose results are not up to date, and why."""
-    unit = Unit(task.stages[0], task.study, task.out, task.config)
-    doubtful = (one for one in task.study.participants if one.id in task.doubtful)
-    found = {one.id: stale_upstream(unit, one, task.stages) for one in doubtful}
-    return {name: why for name, why in found.items() if why}
 
 
 def _left_out(task: _Task, left_out: Mapping[str, str]) -> Iterator[Outcome]:
@@ -298,17 +294,19 @@ def _refused(unit: Unit, error: BsipError) -> Outcome:
     return Outcome(unit.stage.name, unit.name, state, said, error.exit_code)
 
 
-def lacking(unit: Unit) -> Outcome | None:
-    """Why a unit cannot begin: what it reads is not there, or was refused."""
+def lacking(unit: Unit, refused_code: int = 0) -> Outcome | None:
+    """Why a unit cannot begin: what it reads is not there, or was refused, which ends in that exit
+    code."""
     stage, gone = unit.stage.name, unit.missing()
     if not unit.participants():
-        return Outcome(stage, unit.name, "waiting", (f"{unit.name}: nobody is left for {stage}",))
+        why = f"{unit.name}: nobody is left for {stage}"
+        return Outcome(stage, unit.name, "waiting", (why,), refused_code)
     if not gone:
         return None
     folders = [unit.out / participant.id for participant in unit.participants()]
     if any(any(folder.glob("*_refusal-*.parquet")) for folder in folders):
         why = f"{unit.name}: left out of {stage}, since its input was refused"
-        return Outcome(stage, unit.name, "waiting", (why,))
+        return Outcome(stage, unit.name, "waiting", (why,), refused_code)
     first = producer(gone[0]).name
     why = f"{unit.name}: {stage} has no {', '.join(gone)} to read"
     return Outcome(stage, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
@@ -328,15 +326,6 @@ def _bug(stage: str, name: str, error: Exception) -> Outcome:
     trace = "".join(traceback.format_exception(error)).strip()
     found = f"a bug in bsip: {type(error).__name__}: {printable(str(error))}"
     return Outcome(stage, name, "bug", (f"{name}: {found}\n{trace}",), 1)
-
-
-def _killed(task: _Task, exit_code: int | None) -> Outcome:
-    stage = task.stages[0].name if len({stage.name for stage in task.stages}) == 1 else "run"
-    code = exit_code or 0
-    ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    killed = code == -signal.SIGKILL
-    how = _SHORT_OF_MEMORY if killed else f"the process crashed ({ending})"
-    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
 
 
 # --- only one program at a time writes into a folder of results -------------------------------

@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, Load, load_config, with_estimators
-from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.config import Config, Load, load_config
+from bsip_cli.errors import UsageError, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
 from bsip_cli.running.runner import Manner, Outcome, run_stages
 from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
@@ -59,13 +59,18 @@ def run_session(
     if not chosen:
         notes.append(_left_behind(out, opened.study))
     refusals = (*opened.refusals, *_notes(*notes))
-    participants = opened.study.participants
     manner = Manner(force=force, verify=verify, jobs=jobs)
     running = run_stages(stages, opened.study, out, opened.config, manner)
-    persons, trials = len(participants), sum(len(p.trials) for p in participants)
-    units = {"cohort": 1, "participant": persons, "trial": trials}
-    total = sum(cost_s(s.name, s.level) * units[s.level] for s in stages)
-    return follow(command, refusals, running, total, out, _cost_s, verbose=verbose, quiet=quiet)
+    trials = {p.id: len(p.trials) for p in opened.study.participants}
+    units = {"cohort": [1], "participant": trials.values(), "trial": [1] * sum(trials.values())}
+    total = sum(cost_s(s.name, s.level, n) for s in stages for n in units[s.level])
+
+    def cost(outcome: Outcome) -> float:
+        level = "cohort" if outcome.unit == "group" else "participant"
+        level = "trial" if "_task-" in outcome.unit else level
+        return cost_s(outcome.stage, level, trials.get(outcome.unit, 1))
+
+    return follow(command, refusals, running, total, out, cost, verbose=verbose, quiet=quiet)
 
 
 def _stages(
@@ -108,24 +113,19 @@ def open_study(
     BadDataError
         participants.tsv cannot be used.
     """
-    config = with_estimators(_config(root, config_file), estimators)
+    config = _config(root, config_file, estimators)
     roles = config.roles.model_dump()
     study, refusals = load_study(root, roles, chosen)
     if config.loads or config.ingest.prefixes:
-        whole = load_study(root, roles) if chosen else (study, refusals)
-        _check_names(config, *whole)
+        whole, refused = load_study(root, roles) if chosen else (study, refusals)
+        if not refused:  # else a load may belong to who or what was refused
+            _check_trials(config.loads, whole)
+            known = [participant.id for participant in whole.participants]
+            remedy = "correct [ingest] prefixes in study.toml"
+            _check_known("ingest.prefixes", config.ingest.prefixes, known, remedy)
     make_out(out, root)
-    refused = (Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals)
-    return OpenedStudy(study, config, (*_notes(*study.notes), *refused))
-
-
-def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
-    """Whether loads and prefixes name who and what is there, in the whole study."""
-    if not refusals:  # else a load may belong to who or what was refused
-        _check_trials(config.loads, study)
-        known = [participant.id for participant in study.participants]
-        remedy = "correct [ingest] prefixes in study.toml"
-        _check_known("ingest.prefixes", config.ingest.prefixes, known, remedy)
+    told = (Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals)
+    return OpenedStudy(study, config, (*_notes(*study.notes), *told))
 
 
 def _left_behind(out: Path, study: Study) -> str:
@@ -180,11 +180,6 @@ def follow(
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
 
 
-def _cost_s(outcome: Outcome) -> float:
-    level = "cohort" if outcome.unit == "group" else "participant"
-    return cost_s(outcome.stage, "trial" if "_task-" in outcome.unit else level)
-
-
 @dataclass
 class _Voice:
     """What the user hears; a remark that many recordings get is made once, and at the end it is
@@ -222,10 +217,11 @@ def _write(stage: str, text: str) -> None:
     tqdm.write(f"{stage}: {text}", file=sys.stderr)
 
 
-def _config(root: Path, config_file: Path | None) -> Config:
+def _config(root: Path, config_file: Path | None, estimators: tuple[str, ...]) -> Config:
     if config_file is not None and not config_file.is_file():
         raise UsageError("there is no such file", file=config_file, remedy="check --config")
-    config = load_config([root / "study.toml", *([config_file] if config_file else [])])
+    files = [root / "study.toml", *([config_file] if config_file else [])]
+    config = load_config(files, estimators)
     for option in ("marker_set", "skeleton"):  # a user's own file lies in the study, or here
         in_study = root / (name := getattr(config, option))
         if name.endswith(".toml") and in_study.is_file():
@@ -240,14 +236,9 @@ def _config(root: Path, config_file: Path | None) -> Config:
 
 def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> None:
     states: Counter[str] = Counter(outcome.state for outcome in outcomes)
-    words = {
-        "done": "done",
-        "fresh": "up to date",
-        "refused": "refused",
-        "unwritten": "not to be written",
-        "waiting": "without input",
-        "bug": "failed by a bug",
-    }
+    words = {"done": "done", "fresh": "up to date", "refused": "refused"}
+    words |= {"unwritten": "not to be written", "waiting": "without input"}
+    words |= {"bug": "failed by a bug"}
     said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
     where = f"; results in {printable(str(out))}" if out else ""
     click.echo(f"bsip {command}: {said or 'nothing to do'}{where}", err=True)

@@ -31,35 +31,6 @@ from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
 
-# --- what lies in a folder of results, and what of it a refusal has made void ---------------------
-
-
-@dataclass(frozen=True)
-class Folder:
-    """The names in the folder of a participant, or of the group, at one moment."""
-
-    path: Path
-    names: frozenset[str]
-
-    @classmethod
-    def now(cls, path: Path) -> Folder:
-        """As it is; a folder that is not there is empty."""
-        try:
-            with os.scandir(path) as entries:
-                return cls(path, frozenset(entry.name for entry in entries))
-        except FileNotFoundError:
-            return cls(path, frozenset())
-
-    def refusals(self, owners: Collection[str], stages: Iterable[Stage]) -> list[Path]:
-        """The refusals of these owners (ids of participants, stems of trials) by these stages."""
-        if not any("_refusal-" in name for name in self.names):
-            return []
-        asked = (f"{owner}_refusal-{stage.name}.parquet" for owner in owners for stage in stages)
-        return [self.path / name for name in dict.fromkeys(asked) if name in self.names]
-
-
-# --------------------------------------------------------------------------------------------------
-
 
 @dataclass
 class Unit:
@@ -89,11 +60,27 @@ class Unit:
     def name(self) -> str:
         if self.trial is not None:
             return self.trial.stem
-        return self.participant.id if self.participant else "group"
+        return _owner(self.participant)
+
+    @property
+    def person(self) -> Participant:
+        """Of a unit of a participant or trial, whom it is about."""
+        assert self.participant is not None
+        return self.participant
+
+    @property
+    def own_trial(self) -> Trial:
+        """Of a unit of a trial, which."""
+        assert self.trial is not None
+        return self.trial
 
     def warn(self, message: str) -> None:
         """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
         self.messages.append(printable(message))
+
+    def say(self, sentence: str) -> None:
+        """The same of this unit, with its name."""
+        self.warn(f"{self.name}: {sentence}")
 
     # --- where things lie -------------------------------------------------------------------
 
@@ -104,29 +91,25 @@ class Unit:
         level, name = SCHEMAS[kind].level, SCHEMAS[kind].file_name
         if level == "cohort":
             return self.out / "group" / f"group_{name}.parquet"
-        participant = participant or self.participant
-        assert participant is not None
+        participant = participant or self.person
         owner = trial or self.trial if level == "trial" else None
         stem = owner.stem if owner else participant.id
         return self.out / participant.id / f"{stem}_{name}.parquet"
 
     def refusal_path(self) -> Path:
         """Where a refusal of this unit is written down."""
-        folder = self.participant.id if self.participant else "group"
-        return self.out / folder / f"{self.name}_refusal-{self.stage.name}.parquet"
+        return (
+            self.out / _owner(self.participant) / f"{self.name}_refusal-{self.stage.name}.parquet"
+        )
 
     def loads(self, trial: Trial | None = None) -> tuple[Load, ...]:
         """Known loads of a trial (by default the unit's own; without one, of the participant)."""
-        trial = trial or self.trial
+        trial, loads = trial or self.trial, self.config.loads
         if trial is None:
-            worn = (
-                load
-                for load in self.config.loads
-                if any(load.is_worn_by(person.id) for person in self.participants())
-            )
-            return tuple(worn)
+            everybody = [person.id for person in self.participants()]
+            return tuple(one for one in loads if any(map(one.is_worn_by, everybody)))
         where = (trial.participant_id, trial.task, trial.run)
-        return tuple(load for load in self.config.loads if load.is_carried_in(*where))
+        return tuple(load for load in loads if load.is_carried_in(*where))
 
     def load_kg(self, trial: Trial | None = None) -> float:
         """What the known loads of a trial weigh together."""
@@ -137,32 +120,38 @@ class Unit:
 
     def trials(self, *kinds: str) -> tuple[Trial, ...]:
         """The participant's trials for which all these kinds are there and not refused."""
-        assert self.participant is not None
-        folder = self._folder(self.participant)
+        names = self._names(self.person)
         return tuple(
             trial
-            for trial in self.participant.trials
-            if all(self._stands(kind, folder, self.participant, trial) for kind in kinds)
+            for trial in self.person.trials
+            if all(self.stands(kind, trial, self.person, names) for kind in kinds)
         )
 
-    def stands(self, kind: str, trial: Trial | None, participant: Participant) -> bool:
-        """An artifact is there and not refused."""
-        return self._stands(kind, self._folder(participant), participant, trial)
-
-    def _folder(self, participant: Participant | None) -> Folder:
-        return Folder.now(self.out / (participant.id if participant else "group"))
-
-    def _stands(
-        self, kind: str, folder: Folder, participant: Participant | None, trial: Trial | None
+    def stands(
+        self,
+        kind: str,
+        trial: Trial | None,
+        participant: Participant | None,
+        names: Collection[str] | None = None,
     ) -> bool:
-        """It is there, and no stage up to its own has refused the trial or participant since."""
+        """An artifact is there, and no stage up to its own has refused the trial or participant
+        since; ``names`` of the files in the folder, where they are known."""
+        names = self._names(participant) if names is None else names
         before = STAGES[: STAGES.index(producer(kind)) + 1]
         of_trials = [stage for stage in before if stage.level == "trial"]
         return (
-            self.path(kind, trial, participant).name in folder.names
-            and not folder.refusals(_owners_of_refusals(participant), before)
-            and not (trial and folder.refusals([trial.stem], of_trials))
+            self.path(kind, trial, participant).name in names
+            and not _refusals(names, [_owner(participant)], before)
+            and not (trial and _refusals(names, [trial.stem], of_trials))
         )
+
+    def _names(self, participant: Participant | None) -> frozenset[str]:
+        """Of the files of a participant, or of the group, at this moment."""
+        try:
+            with os.scandir(self.out / _owner(participant)) as entries:
+                return frozenset(entry.name for entry in entries)
+        except FileNotFoundError:
+            return frozenset()
 
     # --- inputs ------------------------------------------------------------------------------
 
@@ -186,15 +175,14 @@ class Unit:
 
     def _files_of(self, participant: Participant | None) -> dict[str, Path]:
         """What the unit reads of a participant, or of the group: artifacts, refusals."""
-        folder = self._folder(participant)
-        kinds = [
-            k for k in self.stage.inputs if (SCHEMAS[k].level == "cohort") == (not participant)
-        ]
-        paths = [path for kind in kinds for path in self._standing(kind, folder, participant)]
+        names, kinds = self._names(participant), self.stage.inputs
+        own = [kind for kind in kinds if (SCHEMAS[kind].level == "cohort") == (not participant)]
+        paths = [path for kind in own for path in self._standing(kind, participant, names)]
         if participant is not None and self.trial is None:
-            owners = _owners_of_refusals(participant, *participant.trials)
+            owners = [participant.id, *(trial.stem for trial in participant.trials)]
             before = takewhile(lambda stage: stage.label != self.stage.label, STAGES)
-            paths += folder.refusals(owners, tuple(before))  # reports tell of them
+            folder = self.out / participant.id  # reports tell of them
+            paths += [folder / name for name in _refusals(names, owners, tuple(before))]
         return {path.name: path for path in paths}
 
     def _files_of_options(self) -> dict[str, Path]:
@@ -202,16 +190,14 @@ class Unit:
         paths = (Path(getattr(self.config, name)) for name in named)
         return {path.name: path for path in paths if path.suffix == ".toml"}
 
-    def _standing(self, kind: str, folder: Folder, participant: Participant | None) -> list[Path]:
+    def _standing(
+        self, kind: str, participant: Participant | None, names: Collection[str]
+    ) -> list[Path]:
         """Artifacts of a kind that the unit reads: its own, or those of all trials below it."""
-        trials: Iterable[Trial | None] = (self.trial,)
-        if participant is not None and SCHEMAS[kind].level == "trial" and self.trial is None:
-            trials = participant.trials
-        return [
-            self.path(kind, trial, participant)
-            for trial in trials
-            if self._stands(kind, folder, participant, trial)
-        ]
+        below = participant and SCHEMAS[kind].level == "trial" and self.trial is None
+        trials = participant.trials if participant and below else (self.trial,)
+        standing = (one for one in trials if self.stands(kind, one, participant, names))
+        return [self.path(kind, one, participant) for one in standing]
 
     def missing(self) -> list[str]:
         """Kinds the unit cannot do without and that are not there.
@@ -225,10 +211,9 @@ class Unit:
         return all(kind in self.stage.inputs and self._has(kind) for kind in kinds)
 
     def _has(self, kind: str) -> bool:
-        if SCHEMAS[kind].level == "cohort":
-            return bool(self._standing(kind, self._folder(None), None))
-        if self.participant is not None:
-            return bool(self._standing(kind, self._folder(self.participant), self.participant))
+        if SCHEMAS[kind].level == "cohort" or self.participant is not None:
+            whose = None if SCHEMAS[kind].level == "cohort" else self.participant
+            return bool(self._standing(kind, whose, self._names(whose)))
         return any(
             self.path(kind, trial, person).exists()
             for person in self.study.participants
@@ -244,12 +229,9 @@ class Unit:
                 options[name] = Path(options[name]).name
         if "loads" in options:  # another person's or trial's load changes nothing here
             options["loads"] = [load.model_dump(mode="json") for load in self.loads()]
-        if self.participant is not None:
-            options["participant"] = {
-                "sex": self.participant.sex,
-                "mass_kg": self.participant.mass_kg,
-                "height_m": self.participant.height_m,
-            }
+        if (one := self.participant) is not None:
+            known = {"sex": one.sex, "mass_kg": one.mass_kg, "height_m": one.height_m}
+            options["participant"] = known
         return {
             "stage": self.stage.name,
             "bsip_version": __version__,
@@ -269,8 +251,12 @@ class Unit:
                 answer = json.dumps(self.facts(kind)["answer"], sort_keys=True)
                 hashes[f"{kind} of the group"] = hashlib.sha256(answer.encode()).hexdigest()
             return hashes
-        everybody = ((person.id, self._files_of(person)) for person in self.study.participants)
-        people = {name: hash_of_files(files) for name, files in everybody if files}
+        people = {}
+        for person in self.study.participants:
+            if own := sorted(self._files_of(person).items()):
+                lines = "".join(f"{name} {file_hash(path)}\n" for name, path in own)
+                text = lines.encode("utf-8", "surrogateescape")
+                people[person.id] = hashlib.sha256(text).hexdigest()
         files = self._files_of(None) | self._files_of_options()
         hashes = {name: file_hash(path) for name, path in files.items()}
         return hashes | people | {name: f"left out: {why}" for name, why in self.left_out.items()}
@@ -330,10 +316,18 @@ class Unit:
         write_artifact(path, kind, whole, notes)
 
 
-def _owners_of_refusals(participant: Participant | None, *trials: Trial | None) -> list[str]:
-    """Whose refusals concern a participant's artifacts in these trials."""
-    owner = participant.id if participant else "group"
-    return [owner, *(trial.stem for trial in trials if trial is not None)]
+def _owner(participant: Participant | None) -> str:
+    return participant.id if participant else "group"
+
+
+def _refusals(
+    names: Collection[str], owners: Collection[str], stages: Iterable[Stage]
+) -> list[str]:
+    """Among some files, the refusals of these owners (ids, stems of trials) by these stages."""
+    if not any("_refusal-" in name for name in names):
+        return []
+    asked = (f"{owner}_refusal-{stage.name}.parquet" for owner in owners for stage in stages)
+    return [name for name in dict.fromkeys(asked) if name in names]
 
 
 # --- what made an artifact: inputs, options, code, versions; no clock: same work, same bytes ------
@@ -359,77 +353,69 @@ def code_hash(module: str) -> str:
     modules = imported_by(module)
     digest = hashlib.sha256()
     for name in sorted(modules):
-        digest.update(f"{name}\n".encode() + _source(name))
+        digest.update(f"{name}\n{_source(name)}".encode())
     for file in sorted(_data_of(modules)):
         digest.update(f"{file.name}\n".encode() + file.read_bytes())
     return digest.hexdigest()
 
 
 def imported_by(module: str) -> frozenset[str]:
-    """The modules of the package that ``module`` imports anywhere, itself among them."""
+    """The modules of the package that ``module`` imports anywhere, with it and their packages."""
     found: set[str] = set()
-    waiting = [module, *_parents(module)]
+    waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name not in found and _file_of(name) is not None:
+        if name and name not in found and _source(name) is not None:
             found.add(name)
-            waiting += _named_in(name)
+            waiting += [name.rpartition(".")[0], *_named_in(name)]
     return frozenset(found)
 
 
 @lru_cache(maxsize=1024)
-def _named_in(module: str) -> tuple[str, ...]:
-    """Modules that a module's text names in imports, with their packages."""
-    text = _source(module).decode()
+def _named_in(module: str) -> frozenset[str]:
+    """Modules, and what else may be one, that a module's text names in imports."""
+    text = _source(module) or ""
     named = set(_IMPORT.findall(text))
     for package, names in _FROM.findall(text):
         words = re.findall(r"\w+", re.sub(r"#.*", "", names))
         named |= {package, *(f"{package}.{word}" for word in words)}
     for package in _CHOSEN_LATER.findall(text):
-        folder = _PACKAGE.joinpath(*package.split(".")[1:])
-        named |= {f"{package}.{file.stem}" for file in folder.glob("*.py")}
-    return (*named, *(parent for name in named for parent in _parents(name)))
+        named |= {f"{package}.{file.stem}" for file in _place_of(package).glob("*.py")}
+    return frozenset(named)
 
 
-def _parents(module: str) -> list[str]:
-    return [module.rsplit(".", k)[0] for k in range(1, module.count(".") + 1)]
-
-
-def _file_of(module: str) -> Path | None:
-    place = _PACKAGE.joinpath(*module.split(".")[1:])
-    candidates = (place.with_suffix(".py"), place / "__init__.py")
-    return next((file for file in candidates if file.is_file()), None)
+def _place_of(module: str) -> Path:
+    """Its folder, if it is a package."""
+    return _PACKAGE.joinpath(*module.split(".")[1:])
 
 
 @lru_cache(maxsize=1024)
-def _source(module: str) -> bytes:
-    file = _file_of(module)
-    return file.read_bytes() if file else b""
+def _source(module: str) -> str | None:
+    """Its text; None where there is no such module."""
+    place = _place_of(module)
+    files = (file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file())
+    return next((file.read_text(encoding="utf-8") for file in files), None)
 
 
 def _data_of(modules: frozenset[str]) -> set[Path]:
     """Files that are no code: those named in ``configs/``, and those in the modules' packages."""
-    named = {name for module in modules for name in _SHIPPED.findall(_source(module).decode())}
-    files = {file for name in named - {_OPTIONS} for file in _below(shipped(name))}
-    packages = {module.rpartition(".")[0] for module in modules} - {"", _NAME}
-    folders = {_PACKAGE.joinpath(*package.split(".")[1:]) for package in packages}
+    named = {name for module in modules for name in _SHIPPED.findall(_source(module) or "")}
+    folders = {_place_of(module.rpartition(".")[0]) for module in modules if "." in module}
+    folders -= {_PACKAGE}
     inside = {file for folder in folders for file in _below(folder)}
-    return files | {
-        file
-        for file in inside
-        if next(one for one in file.parents if (one / "__init__.py").is_file()) in folders
+    own = {
+        f for f in inside if next(p for p in f.parents if (p / "__init__.py").is_file()) in folders
     }
+    return own.union(*(_below(shipped(name)) for name in named - {_OPTIONS}))
 
 
 def _below(place: Path) -> set[Path]:
-    """Files that belong to the package and are no code."""
-    files = place.rglob("*") if place.is_dir() else [place]
+    """Files that belong to the package and are no code, nor left by Python, numba or an editor."""
     return {
         file
-        for file in files
+        for file in (place.rglob("*") if place.is_dir() else [place])
         if file.is_file()
         and file.suffix != ".py"
-        # what Python, numba or an editor left there
         and not (file.parent.name == "__pycache__" or file.name[0] == "." or file.name[-1] == "~")
     }
 
@@ -437,12 +423,6 @@ def _below(place: Path) -> set[Path]:
 _LIBRARIES = (
     "clarabel ezc3d jinja2 matplotlib numba numpy pandas pin pyarrow pydantic scipy statsmodels"
 )
-
-
-def hash_of_files(files: Mapping[str, Path]) -> str:
-    """SHA-256 of the lines "name hash" of some files, in the order of their names."""
-    lines = (f"{name} {file_hash(path)}\n" for name, path in sorted(files.items()))
-    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 @lru_cache(maxsize=1)

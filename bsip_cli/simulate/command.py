@@ -149,10 +149,8 @@ RECORDING = re.compile(
 def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dict[str, object]:
     """Hide effects in one recording; returns the truth about it.
 
-    Raises
-    ------
-    UsageError : an effect that measured data cannot have; a file of another kind.
-    BadDataError : the recording cannot take an effect.
+    UsageError: an effect that measured data cannot have; a file of another kind.
+    BadDataError: the recording cannot take an effect.
     """
     check_injectable(effects)
     kind = source.suffix.lower()
@@ -205,11 +203,8 @@ def inject_study(
     Hidden files and folders (.git, of a study under version control) are left behind.
 
     participants : in whose recordings; empty: in everybody's.
-
-    Returns
-    -------
-    The changed recordings, and why others were refused; those are copied as they were, or not at
-    all where they cannot be read.
+    Returns the changed recordings, and why others were refused; those are copied as they were, or
+    not at all where they cannot be read.
     """
     people = sorted(path.name for path in study.glob("sub-*") if is_folder(path))
     unknown = sorted(set(participants) - set(people))

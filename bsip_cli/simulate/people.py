@@ -269,10 +269,8 @@ def _draw_inertias(
         pelvis = row.length_m * lengths["upper_torso"] / trunk
         length = pelvis if body == "lower_torso" else lengths[body]
         mirror = np.array([1.0, 1.0, -1.0 if body.endswith("_l") else 1.0])
-        origin = (
-            build.joints_m["tjc"] if row.origin == "TJC" else np.zeros(3)
-        )  # else the body's own
-        com = origin + mirror * row.com * length
+        is_own = row.origin != "TJC"  # the body's own origin
+        com = (np.zeros(3) if is_own else build.joints_m["tjc"]) + mirror * row.com * length
         com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
         if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
             com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])

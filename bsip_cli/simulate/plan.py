@@ -256,17 +256,11 @@ class Sketch:
             self.angles[f"shoulder_{side}"] = np.zeros((n, 3)) + np.deg2rad([2.0, 12.0, 10.0])
             self.angles[f"elbow_{side}"] = np.zeros(n) + np.deg2rad(16.0)
             self.angles[f"wrist_{side}"] = np.zeros((n, 3)) + np.deg2rad([3.0, 0.0, 70.0])
-            self.feet[side] = FootSketch(
-                ahead_m=np.zeros(n),
-                aside_m=np.zeros(n) + SIDE_SIGN[side] * self.half_stance_m(),
-                raised_m=np.zeros((n, 3)),
-                toe_roll_rad=np.zeros(n),
-                heel_roll_rad=np.zeros(n),
-                tilt_rad=np.zeros((n, 3)),
-                share=np.full(n, 0.5),
-                cop_ahead_m=np.zeros(n) + self.mid_foot_m(),
-                on_plate=np.ones(n, dtype=bool),
-            )
+            aside, ahead = SIDE_SIGN[side] * self.half_stance_m(), self.mid_foot_m()
+            raised, tilt = np.zeros((2, n, 3))
+            still = (np.zeros(n), np.full(n, aside), raised, np.zeros(n), np.zeros(n), tilt)
+            loaded = (np.full(n, 0.5), np.full(n, ahead), np.ones(n, dtype=bool))
+            self.feet[side] = FootSketch(*still, *loaded)
 
     def half_stance_m(self) -> float:
         """Half the distance of the ankles in natural stance."""
@@ -286,6 +280,11 @@ class Sketch:
             reach = np.sqrt((STANDING_REACH * leg) ** 2 - aside**2)
             heights.append(person.ankle_height_m + reach - hip[1])
         return float(min(heights))
+
+    def shift_load(self, side: str, part: np.ndarray) -> None:
+        """Move a part (T,) of the body's weight from one foot to the other one."""
+        self.feet[side].share -= part
+        self.feet[other_side(side)].share += part
 
     def sample_of(self, time_s: float) -> int:
         return round((time_s - self.t_s[0]) / STEP_S)
@@ -330,12 +329,25 @@ def sketch_for(person: Person, duration_s: float) -> Sketch:
     return Sketch(person, np.arange(samples) * STEP_S - MARGIN_S, (0.0, duration_s))
 
 
+def other_side(side: str) -> str:
+    """The left side of the right one, and the other way round."""
+    return "l" if side == "r" else "r"
+
+
+def moved_a_little(
+    sketch: Sketch, rng: np.random.Generator, breath_deg: float, sway: float = 1.0
+) -> None:
+    """Add a breath of motion and sway: nobody stands like a statue."""
+    add_breath_of_motion(sketch, rng, np.deg2rad(breath_deg))
+    add_sway(sketch, rng, sway)
+
+
 def plate_under(sketch: Sketch, rng: np.random.Generator) -> tuple[float, float]:
     """A plate centre near the middle of natural stance."""
     return (sketch.mid_foot_m() + rng.normal(0.0, 0.02), rng.normal(0.0, 0.03))
 
 
-def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float = 1.0) -> None:
+def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float) -> None:
     """Slow wandering of the COP: along the feet, and between them while both carry load."""
     ahead = wander(sketch.t_s, rng, scale * SWAY_M[0], 0.15, 0.8)
     aside = wander(sketch.t_s, rng, scale * SWAY_M[1], 0.15, 0.8) / (2.0 * sketch.half_stance_m())

@@ -16,8 +16,14 @@ from bsip_cli.simulate.effects.loads import WobblingMass
 from bsip_cli.simulate.movements import MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, StudyOptions
 from bsip_cli.simulate.people import Inertia, Person, draw_person
-from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, measure_trial, write_trial
-from bsip_cli.simulate.trial import Trial, simulate_trial
+from bsip_cli.simulate.recording import (
+    SIMULATION_HZ,
+    Measurement,
+    Trial,
+    measure_trial,
+    simulate_trial,
+    write_trial,
+)
 
 HEADING_SPREAD_RAD = np.deg2rad(2.0)
 SCALE_SPREAD_KG = 0.1
@@ -178,25 +184,22 @@ def _trial_record(
     spans = [(times[first], times[last]) for first, last in plan.flights]
     length = len(trial.time_s) * plan.step_s
     on_plate_n = [trial.on_plate[s] * force[:, 1] for s, force in trial.feet_force_n.items()]
+    held = ball and {
+        "segment": ball.body,
+        "mass_kg": ball.mass_kg,
+        "position_m": ball.position_m.tolist(),
+        "release_s": ball.release_s,
+    }
+    of_a_contact = ("side", "start_s", "end_s", "on_plate")
+    inside = (span for span in spans if span[1] > 0.0 and span[0] < length)
     return {
         "seed": seed,
         "duration_s": len(measurement.points_m) / measurement.rates.marker_hz,
         "recorded_from_s": measurement.start_s,
         "effects": [effect.name for effect in effects],
-        "ball": ball
-        and {
-            "segment": ball.body,
-            "mass_kg": ball.mass_kg,
-            "position_m": ball.position_m.tolist(),
-            "release_s": ball.release_s,
-        },
-        "contacts": [
-            {name: getattr(contact, name) for name in ("side", "start_s", "end_s", "on_plate")}
-            for contact in trial.contacts
-        ],
-        "flights_s": [
-            [round(float(a), 3), round(float(b), 3)] for a, b in spans if b > 0.0 and a < length
-        ],
+        "ball": held,
+        "contacts": [{name: getattr(one, name) for name in of_a_contact} for one in trial.contacts],
+        "flights_s": [[round(float(time), 3) for time in span] for span in inside],
         "all_contacts_measured_share": float(np.mean(trial.all_contacts_measured())),
         "largest_vertical_force_n": float(sum(on_plate_n).max()),
         "walkway_to_lab": {"rotation": pose.rotation.tolist(), "offset_m": pose.offset_m.tolist()},

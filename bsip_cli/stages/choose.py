@@ -63,9 +63,8 @@ def run(unit: Unit) -> None:
         return
     judges, data = _judges(unit)
     is_rare = bool(identification.loc[OM, "rare"])
-    by_movement: dict[str, list[Judge]] = {}
-    for judge in judges:
-        by_movement.setdefault(judge.trial.task, []).append(judge)
+    movements = dict.fromkeys(judge.trial.task for judge in judges)
+    by_movement = {one: [judge for judge in judges if judge.trial.task == one] for one in movements}
     of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
     # every movement counts once; of a single one, as far as its own trials tell
     over_all = next(iter(of_each.values()), _UNKNOWN)
@@ -76,10 +75,10 @@ def run(unit: Unit) -> None:
     use = {movement: chosen(differences, is_rare) for movement, differences in found.items()}
     rows = []
     for movement, differences in found.items():
-        judging = by_movement.get(movement, judges)
-        said = f"{_use(movement, use)}: {_why(use[movement], differences, judging, data, is_rare)}"
-        rows.append(_row(movement, use[movement], differences, len(judging), data, said))
-    unit.warn(f"{unit.name}: {rows[0]['sentence']}")
+        judging, best = by_movement.get(movement, judges), use[movement]
+        said = f"{_use(movement, use)}: {_why(best, differences, judging, data, is_rare)}"
+        rows.append(_row(movement, best, differences, len(judging), data, said))
+    unit.say(rows[0]["sentence"])
     unit.write("choice", pd.DataFrame(rows))
 
 
@@ -156,7 +155,7 @@ def _judges(unit: Unit) -> tuple[list[Judge], str]:
     for trial in moving:
         if trial.stem in contacts:
             found = Support(**contacts[trial.stem]).words()
-            unit.warn(f"{unit.name}: {trial.stem} does not judge: {found}")
+            unit.say(f"{trial.stem} does not judge: {found}")
     judges = [_judge(unit, trial) for trial in moving if trial.stem not in contacts]
     known = [judge for judge in judges if judge is not None]
     unseen = [judge for judge in known if judge.trial.stem not in own]

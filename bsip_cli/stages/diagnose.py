@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from zlib import crc32
@@ -13,7 +13,7 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.error_budget import Line, Yardsticks, budget_of, large_errors
-from bsip_cli.diagnosis.error_model import TrialErrors, error_model
+from bsip_cli.diagnosis.error_model import error_model
 from bsip_cli.diagnosis.fault_model import session_of
 from bsip_cli.diagnosis.fault_scores import Library, library_of
 from bsip_cli.diagnosis.fault_search import Found, search
@@ -59,7 +59,13 @@ def run(unit: Unit) -> None:
         facts |= facts_of(found, held, findings)
         limits = detection_rows(found, library, named_from)
         findings = (*_of_markers(free, held, findings, rng), *findings)
-        facts["causes"] = [*_proven(free, held), *facts["causes"]]
+        # slips that the forces show too, of one size for all folds: no plate helped to find them
+        slips = [(one.trial.stem, slip) for one in free for slip in one.slips]
+        facts["causes"][:0] = [
+            cause_record(slip.effect.name, slip.target, (stem,), slip.values)
+            for number, (stem, slip) in enumerate(slips)
+            if held.gain(number).is_real()
+        ]
         if known is not None:
             mine = [one.for_faults for one in free]
             findings = (*known.findings(mine), *findings)
@@ -69,10 +75,7 @@ def run(unit: Unit) -> None:
     budget, large = error_budget(unit, trials, facts["causes"])
     findings = (*_beside(findings, large), *findings)
     if not trials:
-        unit.warn(
-            f"{unit.name}: no trial has motion with every contact on a plate; no movement can be "
-            "diagnosed"
-        )
+        unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")
     names = dict.fromkeys(
         [*(x.trial.stem for x in trials), *(t for f in findings for t in f.trials)]
     )
@@ -84,7 +87,7 @@ def run(unit: Unit) -> None:
     said = verdict_of(diagnosis, limits, budget=budget)
     lines = [cause_line(one, facts["trials"]) for one in causes_of(candidates_of(diagnosis))]
     for sentence in filter(None, (*(lines or [said.headline]), said.limits)):
-        unit.warn(f"{unit.name}: {sentence}")
+        unit.say(sentence)
 
 
 def _searched(
@@ -121,15 +124,6 @@ def _of_markers(
             yield shaken_finding(scene, one.shaken, stem)
         if one.moves and stem not in bent:
             yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
-
-
-def _proven(trials: Sequence[Diagnosed], held: HeldOut) -> Iterator[dict]:
-    """Slips that the forces show too, in full and with the same sizes for every fold: no plate
-    helped to find them."""
-    slips = [(one.trial.stem, slip) for one in trials for slip in one.slips]
-    for number, (stem, slip) in enumerate(slips):
-        if held.gain(number).is_real():
-            yield cause_record(slip.effect.name, slip.target, (stem,), slip.values)
 
 
 def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
@@ -169,7 +163,12 @@ def error_budget(
     for k in every:
         rows += _rows(budget_of(model, grounds, (k,), rng), errors[k].name, data)
     budget = table_of(_KIND, rows)
-    return budget, _large(unit, trials, errors, partial(_along, budget))
+    usual = error_model(errors, 1, adapt=False)
+    options, weight_N = unit.config.diagnosis, trials[0].scene.mass_kg * GRAVITY_M_S2
+    limits = options.large_cop_error_m, 0.01 * options.large_force_error_percent
+    yardsticks = Yardsticks(*limits, options.least_correlation, weight_N)
+    asked = [k for k, one in enumerate(trials) if one.held is None]
+    return budget, large_errors(usual, grounds, asked, yardsticks, partial(_along, budget))
 
 
 def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
@@ -190,27 +189,13 @@ def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
     )
 
 
-def _large(
-    unit: Unit,
-    trials: Sequence[Diagnosed],
-    errors: Sequence[TrialErrors],
-    along: Callable[[Sequence[str], str], str],
-) -> tuple[Finding, ...]:
-    usual = error_model(errors, 1, adapt=False)
-    options, weight_N = unit.config.diagnosis, trials[0].scene.mass_kg * GRAVITY_M_S2
-    limits = options.large_cop_error_m, 0.01 * options.large_force_error_percent
-    yardsticks = Yardsticks(*limits, options.least_correlation, weight_N)
-    asked = [k for k, one in enumerate(trials) if one.held is None]
-    return large_errors(usual, [one.ground for one in trials], asked, yardsticks, along)
-
-
 def _rows(lines: Sequence[Line], trial: str, data: str) -> Iterator[dict]:
     for one in lines:
         factor, unit = scale_of(one.component)
         gain = one.gain
-        known: dict = {"term": one.term, "target": one.target, "component": one.component}
-        known |= {"rms": factor * one.rms, "unit": unit, "share_percent": 100 * one.share}
+        alike: dict = {k: getattr(one, k) for k in ("term", "target", "component", "scale")}
+        known = alike | {"rms": factor * one.rms, "unit": unit, "share_percent": 100 * one.share}
         known |= {"share_low": 100 * one.share_low, "share_high": 100 * one.share_high}
         known |= {"gain_percent": gain.percent, "gain_low": gain.ci_low, "gain_high": gain.ci_high}
         known |= {"data": data if np.isfinite(gain.percent) else "", "trial": trial}
-        yield known | {"scale": one.scale, "alike": ", ".join(one.alike)}
+        yield known | {"alike": ", ".join(one.alike)}

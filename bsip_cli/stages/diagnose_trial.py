@@ -6,18 +6,16 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table, table_of
-from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_scores import Library, limits_of
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, plain, start_s
 from bsip_cli.running.unit import Unit
 
 
 def run(unit: Unit) -> None:
     """Read the person's diagnosis and error budget; write this trial's part of them."""
-    assert unit.trial is not None
-    stem, overall = unit.trial.stem, unit.read("overall-diagnosis")
+    stem, overall = unit.own_trial.stem, unit.read("overall-diagnosis")
     budget = unit.read("overall-error-budget")
     unit.write("error-budget", budget[budget["trial"] == stem])
     if stem not in unit.facts("overall-diagnosis").get("trials", []):

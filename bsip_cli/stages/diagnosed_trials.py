@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 from zlib import crc32
 
 import numpy as np
-import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
@@ -19,14 +19,16 @@ from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
-from bsip_cli.diagnosis.stated_mass import (
+from bsip_cli.diagnosis.support import (
+    HANDS,
+    LIGHTER,
+    Support,
     agreed_share,
     is_noticed,
     loaded_plate,
     stated_mass_findings,
     weight_share,
 )
-from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.markers import BEFORE_S
 from bsip_cli.effects.scene import Scene
@@ -103,7 +105,7 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     sd = stated_sd(unit)
     standing = [(t, s) for t, s in scenes if t.role == STATIC][:1]
     if standing:
-        share, manner = weight_share(standing[0][1]), "in quiet standing"
+        share, manner = weight_share(standing[0][1]), "in quiet stance"
     else:
         standing, manner = list(scenes), "in motion"
         share = agreed_share([s for _, s in scenes], sd) or 0.0
@@ -214,16 +216,12 @@ def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
 def _slips(unit: Unit, trial: Trial) -> list[Slip]:
     """Markers off their places that the inverse kinematics has found, a slip's before those of
     the whole trial."""
-    columns = ["marker", "start_s", "statistic", "size_m"]
-    kinds = {
-        kind: rows[columns] for kind, rows in unit.read("marker-events", trial).groupby("kind")
-    }
-    slips, offsets = (kinds.get(one, pd.DataFrame(columns=columns)) for one in ("slip", "offset"))
+    rows: list[Any] = list(unit.read("marker-events", trial).itertuples())
     return [
-        *(Slip(str(m), float(t), float(z), 0.0) for m, t, z, _ in slips.to_numpy()),
+        *(Slip(x.marker, x.start_s, x.statistic, 0.0) for x in rows if x.kind == "slip"),
         *(
-            Slip(str(m), float(t) - BEFORE_S, float(z), _FAR_OFF * float(size) / float(z))
-            for m, t, z, size in offsets.to_numpy()
-            if z > _FAR_OFF
+            Slip(x.marker, x.start_s - BEFORE_S, x.statistic, _FAR_OFF * x.size_m / x.statistic)
+            for x in rows
+            if x.kind == "offset" and x.statistic > _FAR_OFF
         ),
     ]

@@ -41,7 +41,7 @@ def run(unit: Unit) -> None:
     bsip, stems = unit.read("bsip"), set(unit.read("used-blocks")["trial"])
     trials = [trial for trial in unit.trials("kinematics", "wrench") if trial.stem in stems]
     if causes and not trials:
-        unit.warn(f"{unit.name}: nothing was identified, so there is no OM to extend")
+        unit.say("nothing was identified, so there is no OM to extend")
     if not causes or not trials:
         unit.write("extended-bsip", ())
         unit.write("bsip-change", ())
@@ -50,7 +50,7 @@ def run(unit: Unit) -> None:
     changes = _changes(bsip, extended)
     unit.write("extended-bsip", extended)
     unit.write("bsip-change", changes)
-    unit.warn(f"{unit.name}: {change_sentence(with_all_causes(changes))}")
+    unit.say(change_sentence(with_all_causes(changes)))
 
 
 # --- parameters -------------------------------------------------------------------------------
@@ -99,12 +99,10 @@ def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
     tables = []
     for method in dict.fromkeys(extended["method"]):
         after = extended[extended["method"] == method].set_index("segment")
-        before, known = om.loc[after.index], {"method": method, "segment": list(after.index)}
-        mass = (after["mass_kg"] - before["mass_kg"]).to_numpy()
-        shift = (after[_COM] - before[_COM]).to_numpy()
-        length = np.linalg.norm(shift, axis=1)
-        table = pd.DataFrame(known | {"mass_change_kg": mass})
-        table[_COM_CHANGE] = shift
+        shift = (after[["mass_kg", *_COM]] - om.loc[after.index, ["mass_kg", *_COM]]).to_numpy()
+        mass, length = shift[:, 0], np.linalg.norm(shift[:, 1:], axis=1)
+        table = pd.DataFrame({"method": method, "segment": list(after.index)})
+        table[["mass_change_kg", *_COM_CHANGE]] = shift
         table["com_change_m"] = length
         words: list[list[str]] = [[] for _ in mass]
         for name, sizes in (("mass", np.abs(mass)), ("centre of mass", length)):

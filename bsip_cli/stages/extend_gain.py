@@ -6,10 +6,10 @@ from zlib import crc32
 
 import numpy as np
 
-from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
 from bsip_cli.report.verdict import gain_sentence
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.reconstruct import gain_rows
+from bsip_cli.statistics.choice import BlockErrors, pooled
 
 
 def run(unit: Unit) -> None:
@@ -19,16 +19,11 @@ def run(unit: Unit) -> None:
     if not concerned:
         unit.write("overall-gain", ())
         return
-    components = next(iter(concerned.values()))["blocks"]
-    errors = {
-        component: pooled(
-            [
-                BlockErrors(**{name: np.array(x) for name, x in one["blocks"][component].items()})
-                for one in concerned.values()
-            ]
-        )
-        for component in components
-    }
+    errors = {}
+    for component in next(iter(concerned.values()))["blocks"]:
+        sums = [one["blocks"][component].items() for one in concerned.values()]
+        each = [BlockErrors(**{name: np.array(x) for name, x in one}) for one in sums]
+        errors[component] = pooled(each)
     methods = dict.fromkeys(one["method"] for one in concerned.values())
     seed = crc32(unit.name.encode())
     data = "; ".join(
@@ -37,4 +32,4 @@ def run(unit: Unit) -> None:
     )  # held_out: a, b; identification: c
     rows = gain_rows(errors, ", ".join(methods), data, seed)
     unit.write("overall-gain", rows)
-    unit.warn(f"{unit.name}: {gain_sentence(rows) or 'no error could be compared'}")
+    unit.say(gain_sentence(rows) or "no error could be compared")

@@ -10,9 +10,14 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
-from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
-from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
+from bsip_cli.diagnosis.cause import (
+    Blocks,
+    Cause,
+    corrected_wrench,
+    is_of_the_forces,
+    method_of,
+    unseen_change_by,
+)
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, load_phi, person_of
@@ -29,14 +34,14 @@ from bsip_cli.stages.reconstruct import (
     scale_of,
 )
 from bsip_cli.stages.trial_scene import blocks_of, body_beside, causes_of, scene_of
+from bsip_cli.statistics.choice import BlockErrors, block_errors
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 
 def run(unit: Unit) -> None:
     """Read the causes, motion, wrench and parameters; write the gain, amend the comparison."""
-    assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
-    own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
+    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
     if not own or extended.empty:
         for kind in ("gain", "corrected-wrench"):
             unit.write(kind, ())
@@ -46,7 +51,7 @@ def run(unit: Unit) -> None:
     person = person_of(unit)
     measured = unit.read("wrench")
     judgement = judgement_of(unit, unit.read("kinematics"), measured)
-    blocks = blocks_of(unit, unit.trial.stem)
+    blocks = blocks_of(unit, unit.own_trial.stem)
     scene, parameters = _scene(unit, person, extended)
     fold = blocks.fold_of(judgement.times_s)
     raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(parameters[OM])}

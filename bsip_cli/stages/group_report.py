@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any
 
 import pandas as pd
 
@@ -47,12 +46,14 @@ def record_of(unit: Unit) -> CohortRecord:
     """Everything that is there of the whole study."""
     facts = unit.facts("values")
     options = unit.config.stats
-    criteria = Criteria(options.alpha, options.equivalence_percent)
+    criteria, told = Criteria(options.alpha, options.equivalence_percent), unit.read("comparisons")
 
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
 
-    use = {person.id: _use(unit, person) for person in unit.study.participants}
+    choices = {one.id: _read(unit, "choice", one) for one in unit.study.participants}
+    # the table's parameters where nothing was chosen
+    use = {name: str(rows["use"].iloc[0]) if len(rows) else RM for name, rows in choices.items()}
     errors = yardsticks_of(read, use)
     return CohortRecord(
         members=tuple(
@@ -60,9 +61,7 @@ def record_of(unit: Unit) -> CohortRecord:
             for person in unit.study.participants
         ),
         ratios=ratios_of(read),
-        tables=build_tables(
-            unit.read("comparisons"), criteria, facts["fitted_on"], facts["missing"]
-        ),
+        tables=build_tables(told, criteria, facts["fitted_on"], facts["missing"]),
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(
             f"{gone['sentence']}: not in table{'s' if len(gone['tables']) > 1 else ''} "
@@ -75,20 +74,27 @@ def record_of(unit: Unit) -> CohortRecord:
     )
 
 
-def _use(unit: Unit, participant: Participant) -> str:
-    """Which parameters to use; the table's where nothing was chosen."""
-    if not unit.path("choice", participant=participant).exists():
-        return RM
-    return str(unit.read("choice", participant=participant)["use"].iloc[0])
+def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
+    """A participant's table; empty where there is none."""
+    there = unit.path(kind, participant=participant).exists()
+    return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
 def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]) -> Member:
     has_page = unit.path("report-files", participant=participant).exists()
     facts = unit.facts("report-files", participant=participant) if has_page else {}
+    told = _read(unit, "identification", participant)
+    shown = {"person": _read(unit, "person", participant), "identification": told}
+    if len(told):
+        shown["identification"] = told[told["method"] == OM]
+    first = {
+        kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
+        for kind, rows in shown.items()
+    }
     return Member(
         participant.id,
-        _shown(unit, "person", participant),
-        _shown(unit, "identification", participant, OM),
+        first["person"],
+        first["identification"],
         has_page,
         refusals_of(unit, participant),
         _searched(unit, participant),
@@ -104,17 +110,6 @@ def _searched(unit: Unit, participant: Participant) -> Searched | None:
     diagnosis = unit.read("overall-diagnosis", participant=participant)
     facts = unit.facts("overall-diagnosis", participant=participant)
     return searched(participant.id, diagnosis, facts)
-
-
-def _shown(
-    unit: Unit, kind: str, participant: Participant, method: str = ""
-) -> dict[str, Any] | None:
-    """What is shown of the first row, of those of a method."""
-    if not unit.path(kind, participant=participant).exists():
-        return None
-    rows = unit.read(kind, participant=participant)
-    rows = rows[rows["method"] == method] if method else rows
-    return None if rows.empty else {name: rows[name].iloc[0] for name in SHOWN[kind]}
 
 
 def _origins(unit: Unit) -> Iterator[Origin]:

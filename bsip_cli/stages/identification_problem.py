@@ -14,9 +14,15 @@ from bsip_cli.dynamics.base_parameters import find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.identification.equations import Instruments, Recording, accumulate, residual_series
+from bsip_cli.identification.equations import (
+    Instruments,
+    Recording,
+    accumulate,
+    even_noise,
+    noise_of,
+    residual_series,
+)
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, spread_names
@@ -76,9 +82,7 @@ def recordings_of(
         rate = 1.0 / float(np.median(np.diff(times)))
         use = usable_frames(unit, trial) & ~_held_out(unit, times)
         if not use.any():
-            unit.warn(
-                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
-            )
+            unit.say(f"{trial.stem} has no frame with all contacts on plates; left out")
             continue
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})

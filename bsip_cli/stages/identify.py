@@ -23,7 +23,6 @@ from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.uncertainty import (
     RARE,
     Excitation,
-    Rarity,
     excitation,
     in_words,
     rarity_of,
@@ -62,7 +61,7 @@ def run(unit: Unit) -> None:
     for trial in trials:
         known = load_words(unit, trial) if trial.stem in set(blocks["trial"]) else ""
         if known:
-            unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
+            unit.say(f"taken off the forces of {trial.stem} as a known load: {known}")
     if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings, facts)
         unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
@@ -70,8 +69,8 @@ def run(unit: Unit) -> None:
     lost = person.without_data()[list(skeleton.bodies)]
     fixed = [name for name, is_lost in zip(skeleton.body_names, lost, strict=True) if is_lost]
     if fixed:
-        unit.warn(
-            f"{unit.name}: no data for {', '.join(map(segment_in_words, fixed))}: no markers show "
+        unit.say(
+            f"no data for {', '.join(map(segment_in_words, fixed))}: no markers show "
             "how they move, OM keeps the table's values (RM) there"
         )
     problem, reference = problem_of(unit, person, prior, recordings)
@@ -82,7 +81,7 @@ def run(unit: Unit) -> None:
     results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
     tables = [regression.drop(columns=["note", *spread_names()])]
     for method, result in results.items():
-        unit.warn(f"{unit.name}: {method}: {estimates[method].note}")
+        unit.say(f"{method}: {estimates[method].note}")
         tables.append(
             bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
         )
@@ -104,8 +103,8 @@ def _write_table_only(
     unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
 ) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
-    unit.warn(
-        f"{unit.name}: {duration_s(recordings):.2f} s of motion with every contact on a plate, "
+    unit.say(
+        f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
     unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
@@ -139,26 +138,19 @@ def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[
         moving = [trial for trial in measured if trial.role != "static"] or measured
         free = [trial for trial in moving if trial.stem not in contacts]
         chosen = [max(free, key=lambda trial: counts[trial])] if free else []
-    _tell_of_contacts(unit, named or list(ready), chosen, contacts)
+    instead = ", ".join(trial.stem for trial in chosen)
+    used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
+    for trial in named or ready:
+        if trial.stem in contacts:
+            unit.say(f"{trial.stem} does not identify: {contacts[trial.stem].words()}; {used}")
     if chosen and not named:
-        unit.warn(f"{unit.name}: no trial of an identification task; {chosen[0].stem} identifies")
+        unit.say(f"no trial of an identification task; {chosen[0].stem} identifies")
         if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
-            unit.warn(
-                f"{unit.name}: no other trial validates, so the fit is judged on the data it was "
+            unit.say(
+                "no other trial validates, so the fit is judged on the data it was "
                 "made from; identify.hold_out_fraction would keep blocks out"
             )
     return chosen
-
-
-def _tell_of_contacts(
-    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: Mapping[str, Support]
-) -> None:
-    instead = ", ".join(trial.stem for trial in chosen)
-    used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
-    for trial in asked:
-        if trial.stem in contacts:
-            found = contacts[trial.stem].words()
-            unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
 
 
 # --- the estimate -----------------------------------------------------------------------------
@@ -175,26 +167,19 @@ def _rarity(
             rows.append((np.nan, np.nan, False, ""))
             continue
         found = rarity_of(problem.prior, estimate)
-        words = _farthest_in_words(skeleton, found, estimate.phi[::10], problem.prior.phi[::10])
+        kg, table_kg = estimate.phi[::10], problem.prior.phi[::10]
+        words = ", ".join(  # of the segments that make half of the distance
+            f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
+            f"distance from the table; {kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
+            for i in found.farthest()
+        )
         rows.append((found.distance, found.probability, found.is_rare, words))
         if found.is_rare:
-            unit.warn(
-                f"{unit.name}: do not use {method}: a body like this is rarer than 1 in "
+            unit.say(
+                f"do not use {method}: a body like this is rarer than 1 in "
                 f"{1 / RARE:.0f} people, most by {words}"
             )
     return pd.DataFrame(rows, columns=["distance", "probability", "rare", "farthest"])
-
-
-def _farthest_in_words(
-    skeleton: Skeleton, found: Rarity, masses_kg: np.ndarray, table_kg: np.ndarray
-) -> str:
-    """The segments that make half of the distance, with their masses (n,)."""
-    parts = [
-        f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
-        f"distance from the table; {masses_kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
-        for i in found.farthest()
-    ]
-    return ", ".join(parts)
 
 
 def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.DataFrame:

@@ -82,7 +82,7 @@ def _determined(
             for joint, count, size in counts
             if count
         )
-        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
+        unit.say(f"no markers decide {names}; held near the neutral pose")
     sd = np.where(decided, poses.coordinate_sd, 0.0)
     sd[:, :3] = 0.0  # the base's position is in metres
     of_joint = np.maximum.reduceat(sd, skeleton.v_starts, axis=1)
@@ -94,7 +94,7 @@ def _determined(
     lost = [the_joint(name) for name, ok in whole if not ok]
     if lost:
         count = int((~known.all(axis=1)).sum())
-        unit.warn(f"{unit.name}: {count} frames without a pose of {', '.join(lost)}")
+        unit.say(f"{count} frames without a pose of {', '.join(lost)}")
     return known, of_joint.max(axis=1)
 
 
@@ -114,7 +114,7 @@ def _evidence(
 
     found = marker_evidence(marker_fit(person, markers, poses.q, times, **scales), refit, filled)
     for sentence in summaries(found.events, _MOST_SAID):
-        unit.warn(f"{unit.name}: {sentence}")
+        unit.say(sentence)
     return found
 
 

@@ -37,9 +37,8 @@ from bsip_cli.stages.survey import opened, prefix_of, reading_of
 
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
-    assert unit.trial is not None and unit.participant is not None
-    session = reading_of(unit.read("readings"), unit.facts("readings"), unit.trial)
-    recording = assemble(opened(unit, unit.trial), session)
+    session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
+    recording = assemble(opened(unit, unit.own_trial), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, prefix_of(unit)
@@ -74,7 +73,7 @@ def run(unit: Unit) -> None:
     loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
     found = _contacts(unit, recording, filled.markers_m, segments, loads, about)
     contacts, stretches, about_mass = found
-    table, tolerance = unit.participant, unit.config.ingest.mass_tolerance_percent
+    table, tolerance = unit.person, unit.config.ingest.mass_tolerance_percent
     stated_otherwise = against_table(recording.stated, table.mass_kg, table.height_m, tolerance)
     why, taken = recording.forces_note, "took the markers alone; no frame is compared"
     expected = "a force on the person"
@@ -83,7 +82,7 @@ def run(unit: Unit) -> None:
     said = findings_about(session)  # once, of all trials
     for finding in findings:
         if finding.level in ("warning", "excluded", "corrected") and finding not in said:
-            unit.warn(f"{unit.name}: {finding.sentence()}")
+            unit.say(finding.sentence())
     times = recording.time_s()
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
@@ -113,8 +112,7 @@ def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Find
     """The set that is configured, or told from the labels, and how."""
     if unit.config.marker_set != "auto":
         return load_marker_set(unit.config.marker_set), ()
-    assert unit.trial is not None
-    source = quote(str(unit.trial.path))
+    source = quote(str(unit.own_trial.path))
     guess = guess_marker_set(recording.labels, prefix_of(unit), source)
     return guess.marker_set, guess.findings()
 
@@ -193,9 +191,9 @@ def _mass_on_plates(
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     findings, is_open = [], ~np.isfinite(filled.markers_m[..., 0])
-    for k, name in enumerate(names):
-        counts = (int(one[:, k].sum()) for one in (filled.filled, is_open, filled.rigid))
-        closed, left, rigid = counts
+    every = (filled.filled, is_open, filled.rigid)
+    counts = zip(*(one.sum(axis=0).tolist() for one in every), strict=True)
+    for name, (closed, left, rigid) in zip(names, counts, strict=True):
         if closed or left:
             found = f"{closed + left} of {len(is_open)} frames missing"
             action = (

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.artifacts import table_of
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Cause, method_of
-from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
+from bsip_cli.diagnosis.cause import Cause, corrected_plates, is_of_the_forces, method_of
 from bsip_cli.dynamics.joint_moments import (
     Ground,
     JointLoads,
@@ -62,7 +61,7 @@ def run(unit: Unit) -> None:
     spread = _spreads(unit, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
-    _tell(unit, trial, reasons)
+    left_out = _tell(unit, trial, reasons)
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
@@ -72,7 +71,7 @@ def run(unit: Unit) -> None:
     table = pd.concat(tables, ignore_index=True)
     unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
     mass_kg = float(unit.read("person")["mass_kg"].iloc[0])
-    unit.write("joint-peaks", peaks_of(table, mass_kg, _words_of(trial, reasons)))
+    unit.write("joint-peaks", peaks_of(table, mass_kg, left_out))
 
 
 # --- what was measured ------------------------------------------------------------------------
@@ -180,74 +179,56 @@ def _reasons(unit: Unit, trial: _Trial, feet: FootForces) -> Reasons:
     if trial.readings:
         found[_HELD] = np.tile((~trial.measured & ~beside)[:, None], joints)
     for side in SIDES:
-        legs = [i - 1 for i in _way(person, f"foot_{side}")]
+        legs = [i - 1 for i in person.skeleton.way(f"foot_{side}")]
         for words, frames in feet.unknown[side].items():
             found.setdefault(words, np.zeros((count, joints), bool))[:, legs] |= frames[:, None]
     words = "a hand or another segment bears part of the body"
     found[words] = np.zeros((count, joints), bool)
     for segment, frames in _contacts(unit, trial):
-        joints_on = np.isin(np.arange(joints) + 1, _way(person, segment))
-        found[words] |= frames[:, None] & joints_on
-    return found
-
-
-def _way(person: Person, segment: str) -> list[int]:
-    """Segments from one to the pelvis, which is not among them."""
-    skeleton, found = person.skeleton, []
-    i = skeleton.index(segment)
-    while i > 0:
-        found.append(i)
-        i = skeleton.parents[i]
+        on = [i - 1 for i in person.skeleton.way(segment)]
+        found[words][:, on] |= frames[:, None]
     return found
 
 
 def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
     """Segments that touch something no plate measures, and (N,) when, as identify and diagnose
     found them."""
-    assert unit.trial is not None
-    contact = unit.facts("identification")["external_contacts"].get(unit.trial.stem)
+    contact = unit.facts("identification")["external_contacts"].get(unit.own_trial.stem)
     for hand in contact["hands"] if contact else ():
         yield hand, np.ones(len(trial.q), bool)
     for cause in causes_of(unit):
-        if isinstance(cause.effect, UnmeasuredContact) and unit.trial.stem in cause.trials:
+        if isinstance(cause.effect, UnmeasuredContact) and unit.own_trial.stem in cause.trials:
             middle, length = cause.values[3:5]
             yield cause.target, np.abs(trial.times_s - middle) <= length / 2
 
 
-def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
-    """Say what is left out, in one sentence: joints of one reason and number of frames together."""
-    parts = []
-    for words, out in reasons.items():
-        counts = out.sum(axis=0)
-        names = list(map(in_words, trial.person.skeleton.joints[1:]))
-        for frames in sorted(set(counts.tolist()) - {0}, reverse=True):
-            joints = [name for name, n in zip(names, counts, strict=True) if n == frames]
-            which = "all joints" if len(joints) == len(names) else listing(_legs(joints))
+def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
+    """Say what is left out, in one sentence: joints of one reason and number of frames together.
+
+    Returns, by joint, what left frames out, in words; empty where nothing did.
+    """
+    joints, parts = trial.person.skeleton.joints[1:], []
+    counts = {words: out.sum(axis=0).tolist() for words, out in reasons.items()}
+    for words, of_joints in counts.items():
+        for frames in sorted(set(of_joints) - {0}, reverse=True):
+            alike = [in_words(j) for j, n in zip(joints, of_joints, strict=True) if n == frames]
+            which = "all joints" if len(alike) == len(joints) else listing(_legs(alike))
             parts.append(f"{which} in {frames} ({words})")
     if parts:
         count = len(trial.times_s)
-        unit.warn(f"{unit.name}: joint moments left out of {count} frames: {'; '.join(parts)}")
+        unit.say(f"joint moments left out of {count} frames: {'; '.join(parts)}")
+    return {
+        joint: "; ".join(f"{words}: {n[j]} frames" for words, n in counts.items() if n[j])
+        for j, joint in enumerate(joints)
+    }
 
 
 def _legs(joints: list[str]) -> list[str]:
     """A whole leg, or both, by that name."""
-    whole = {
-        side: [f"{side} {joint}" for joint in ("hip", "knee", "ankle")]
-        for side in ("left", "right")
-    }
-    found = [side for side, own in whole.items() if set(own) <= set(joints)]
-    rest = [name for name in joints if not any(name in whole[side] for side in found)]
-    legs = ["both legs"] if len(found) == 2 else [f"the {side} leg" for side in found]
-    return [*legs, *rest]
-
-
-def _words_of(trial: _Trial, reasons: Reasons) -> dict[str, str]:
-    """By joint, what left frames out, in words; empty where nothing did."""
-    found = {}
-    for j, joint in enumerate(trial.person.skeleton.joints[1:]):
-        parts = [(int(out[:, j].sum()), words) for words, out in reasons.items()]
-        found[joint] = "; ".join(f"{words}: {n} frames" for n, words in parts if n)
-    return found
+    legs = {s: {f"{s} {joint}" for joint in ("hip", "knee", "ankle")} for s in ("left", "right")}
+    whole = [side for side, own in legs.items() if own <= set(joints)]
+    rest = [name for name in joints if not any(name in legs[side] for side in whole)]
+    return [*(["both legs"] if len(whole) == 2 else [f"the {s} leg" for s in whole]), *rest]
 
 
 # --- how sure ---------------------------------------------------------------------------------
@@ -305,9 +286,8 @@ def _extended(
     the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
     joints or single markers would need another motion: no model with one of them is computed.
     """
-    assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
-    own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
+    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
     if not own or extended.empty:
         return
     person = trial.person
@@ -317,19 +297,22 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        another_motion = [
-            one
+        if not all(
+            is_of_the_forces(one)
+            or one.effect.on_its_segment
+            or isinstance(one.effect, (SegmentInertia, Turned))
             for one in among
-            if not (is_of_the_forces(one) or one.effect.on_its_segment)
-            and not isinstance(one.effect, (SegmentInertia, Turned))
-        ]
-        if another_motion:
-            unit.warn(
-                f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or "
+        ):
+            unit.say(
+                f"no joint moments of {method_of(among)}: what moves joints or "
                 "markers would need another motion"
             )
             return
-        feet, on_feet = trial.ground(_corrected(trial, scene, among))
+        forces = [one for one in among if is_of_the_forces(one)]
+        corrected = corrected_plates(replace(scene, valid=trial.measured), forces)
+        pairs = zip(trial.readings, trial.plates, strict=True)
+        freed = [replace(one, wrench=corrected.get(name, one.wrench)) for one, name in pairs]
+        feet, on_feet = trial.ground(freed)
         q, upright = in_true_axes(trial.q, on_feet, among)
         touched = besides(replace(scene, q=q), upright, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
@@ -337,7 +320,7 @@ def _extended(
         reasons = _reasons(unit, trial, feet)
         reasons[_SHARED] = np.tile(sharing(person, among), (len(trial.q), 1))
         if reasons[_SHARED].any():
-            unit.warn(f"{unit.name}: {method_of(among)}: joint moments are left out: {_SHARED}")
+            unit.say(f"{method_of(among)}: joint moments are left out: {_SHARED}")
         yield method_of(among), loads, trial.valid(reasons)
 
 
@@ -347,7 +330,7 @@ def sharing(person: Person, causes: Sequence[Cause]) -> np.ndarray:
     out = np.zeros(len(person.skeleton.joints), bool)
     for cause in causes:
         if cause.effect.on_its_segment:
-            ways = [_way(person, segment) for segment in cause.target.split("+")]
+            ways = [person.skeleton.way(segment) for segment in cause.target.split("+")]
             out[list(set().union(*ways).difference(set(ways[0]).intersection(*ways)))] = True
     return out[1:]
 
@@ -386,16 +369,6 @@ def besides(
                 there = found.get(segment, nothing)
                 found[segment] = replace(there, wrench=there.wrench - needs)
     return found
-
-
-def _corrected(trial: _Trial, scene: Scene, causes: Sequence[Cause]) -> tuple[Reading, ...]:
-    """The plates freed of the causes that concern them."""
-    forces = [cause for cause in causes if is_of_the_forces(cause)]
-    corrected = corrected_plates(replace(scene, valid=trial.measured), forces)
-    return tuple(
-        replace(reading, wrench=corrected.get(name, reading.wrench))
-        for reading, name in zip(trial.readings, trial.plates, strict=True)
-    )
 
 
 # --- tables -----------------------------------------------------------------------------------
@@ -462,7 +435,10 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
     methods = list(dict.fromkeys(method for method, *_ in keys))
     rows = []
     for k, (method, joint, axis) in enumerate(keys):
-        other = _compared_with(method, methods)
+        before = [m for m in methods[: methods.index(method)] if is_extended(m)]
+        # RM; of an extended model the one with a cause less
+        usual = OM if is_extended(method) else RM * (method != RM)
+        other = before[-1] if is_extended(method) and before else usual
         change = np.empty(0)
         if other:
             change = moment[k] - moment[keys.index((other, joint, axis))]
@@ -479,11 +455,3 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
             row["change_percent"] = 100 * abs(most) / largest
         rows.append(row)
     return table_of("joint-peaks", rows)
-
-
-def _compared_with(method: str, methods: list[str]) -> str:
-    """RM; of an extended model the one with a cause less."""
-    if not is_extended(method):
-        return "" if method == RM else RM
-    before = [m for m in methods[: methods.index(method)] if is_extended(m)]
-    return before[-1] if before else OM

@@ -37,9 +37,8 @@ class PersonMass:
 
 def stated_mass(unit: Unit, *facts: dict) -> StatedMass | None:
     """From participants.tsv, else the first entry in the ``facts`` of a recording."""
-    assert unit.participant is not None
-    if unit.participant.mass_kg is not None:
-        return StatedMass(unit.participant.mass_kg, TABLE)
+    if unit.person.mass_kg is not None:
+        return StatedMass(unit.person.mass_kg, TABLE)
     known = [one["stated_mass_kg"] for one in facts if one.get("stated_mass_kg") is not None]
     return StatedMass(known[0], "the recording's own entry") if known else None
 
@@ -52,10 +51,9 @@ def compared(
     height_m: float | None = None,
 ) -> Comparison | None:
     """The stated mass with ``load_kg`` against the plates; None without either."""
-    assert unit.participant is not None
     if stated is None or not told.is_known:
         return None
-    options, height_m = unit.config.ingest, height_m or unit.participant.height_m
+    options, height_m = unit.config.ingest, height_m or unit.person.height_m
     limits = options.mass_tolerance_percent, options.mass_gross_percent
     return Comparison(stated.mass_kg, load_kg, told, *limits, height_m)
 
@@ -71,32 +69,28 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""
+    if stated is None and told.is_known:
+        unit.say(f"mass taken from the plates{without}: {told.words()}")
+        return PersonMass(told.mass_kg, PLATES, told.mass_kg, "")
     if stated is None:
-        return _from_plates(unit, told, without)
+        note = f"mass is not known: put mass_kg into participants.tsv, because {told.reason}"
+        unit.say(note)
+        return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
     vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, height_m, static)
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
-        unit.warn(f"{unit.name}: mass {stated.mass_kg:.2f} kg taken from {stated.source}")
+        unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")
     if comparison is None:
         return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
     if comparison.is_gross:
         return _gross(unit, stated, comparison, told.is_known)
     if told.is_known and not comparison.is_small:
-        unit.warn(
-            f"{unit.name}: the plates tell {told.words()}{without}, stated are "
+        unit.say(
+            f"the plates tell {told.words()}{without}, stated are "
             f"{stated.mass_kg:.2f} kg ({comparison.difference_percent:+.1f} %, tolerance "
             f"{comparison.tolerance_percent:g} %)"
         )
     return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
-
-
-def _from_plates(unit: Unit, told: ToldMass, without: str) -> PersonMass:
-    if told.is_known:
-        unit.warn(f"{unit.name}: mass taken from the plates{without}: {told.words()}")
-        return PersonMass(told.mass_kg, PLATES, told.mass_kg, "")
-    note = f"mass is not known: put mass_kg into participants.tsv, because {told.reason}"
-    unit.warn(f"{unit.name}: {note}")
-    return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
 
 
 def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
@@ -113,5 +107,5 @@ def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool
         used, source = float("nan"), UNKNOWN
     what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"
     note = f"{sentence}; {what}: correct mass_kg in participants.tsv"
-    unit.warn(f"{unit.name}: {note}")
+    unit.say(note)
     return PersonMass(used, source, plates_kg, note)

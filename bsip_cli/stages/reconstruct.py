@@ -16,7 +16,6 @@ from bsip_cli.artifacts import table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.error_gain import BlockErrors, error_gain
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -24,6 +23,7 @@ from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
+from bsip_cli.statistics.choice import BlockErrors, error_gain
 from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED, METHODS
@@ -42,9 +42,7 @@ def run(unit: Unit) -> None:
     kinematics, measured = unit.read("kinematics"), unit.read("wrench")
     judgement = judgement_of(unit, kinematics, measured)
     if not judgement.judged.any():
-        unit.warn(
-            f"{unit.name}: no interval in which every contact is on a plate; nothing to judge"
-        )
+        unit.say("no interval in which every contact is on a plate; nothing to judge")
     wrenches, signals = judgement.compared(_wrenches(unit, person, kinematics, measured))
     rows = reconstruction_rows(judgement, wrenches, signals)
     unit.write("reconstruction", rows, facts={"loads": loads_record(unit)})
@@ -131,7 +129,9 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
     facts, options = unit.read("person").iloc[0], unit.config.reconstruct
     times = kinematics["time_s"].to_numpy()
     valid = measured["valid"].to_numpy() & kinematics["determined"].to_numpy()
-    used = _used(unit, times)
+    used, blocks = np.zeros(len(times), dtype=bool), unit.read("used-blocks")
+    for row in blocks[blocks["trial"] == unit.own_trial.stem].itertuples():
+        used |= (times >= row.start_s) & (times <= row.end_s)  # these helped to identify
     judged, data = valid & ~used, "held_out"
     if used.any() and judged.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
         judged, data = valid, "identification"  # nothing else is left to judge by
@@ -155,16 +155,6 @@ def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.nda
         pairs = zip(map(from_readable, rows), origins, strict=True)
         columns.append(np.concatenate([one.moved(-origin).phi() for one, origin in pairs]))
     return methods, np.stack(columns, axis=1)
-
-
-def _used(unit: Unit, times: np.ndarray) -> np.ndarray:
-    """(N,) frames that helped to identify the parameters."""
-    blocks = unit.read("used-blocks")
-    used = np.zeros(len(times), dtype=bool)
-    assert unit.trial is not None
-    for row in blocks[blocks["trial"] == unit.trial.stem].itertuples():
-        used |= (times >= row.start_s) & (times <= row.end_s)
-    return used
 
 
 # --- tables ---------------------------------------------------------------------------------

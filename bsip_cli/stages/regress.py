@@ -26,11 +26,11 @@ def run(unit: Unit) -> None:
     result = regress(person, facts["sex"], facts["mass_kg"], unit.config.regress.table)
     for segment, note in zip(skeleton.body_names, result.notes, strict=True):
         if note:
-            unit.warn(f"{unit.name}: {segment}: {note}")
+            unit.say(f"{segment}: {note}")
     rows = [skeleton.table_rows[i] for i in skeleton.bodies]
     strays = strays_of(facts["sex"], facts["mass_kg"], facts["height_m"], rows)
     if strays.outside:
-        unit.warn(f"{unit.name}: {strays.outside}")
+        unit.say(strays.outside)
     com = np.where(np.isnan(strays.com), unit.config.prior.com_sd_percent, strays.com)
     com = np.hypot(com, _lengths_err(unit, skeleton, result.inertias))
     spreads = np.column_stack([strays.mass, com, strays.moments])

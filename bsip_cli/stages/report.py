@@ -39,11 +39,10 @@ _FOUND = {  # field of a participant's record: kind that is there only if its st
 
 
 def run(unit: Unit) -> None:
-    assert unit.participant is not None
     record = record_of(unit)
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
-    unit.warn(f"{unit.name}: {light.title}. {light.text}".rstrip())
+    unit.say(f"{light.title}. {light.text}".rstrip())
     unit.write("report-files", rows, facts={"light": asdict(light)})
 
 
@@ -66,18 +65,17 @@ def write_page(unit: Unit, document: Document) -> list[Path]:
 
 def record_of(unit: Unit) -> ParticipantRecord:
     """Everything that is there of the unit's participant."""
-    assert unit.participant is not None
     usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
-    trials = sorted(unit.participant.trials, key=lambda trial: list(ROLES).index(trial.role))
+    trials = sorted(unit.person.trials, key=lambda trial: list(ROLES).index(trial.role))
     return ParticipantRecord(
-        id=unit.participant.id,
+        id=unit.person.id,
         facts=unit.read("person").iloc[0],
         bsip=unit.read("bsip"),
         excitation=unit.read("excitation"),
         identification=unit.read("identification"),
         body=person_of(unit),
         trials=tuple(_trial_record(unit, trial, usable) for trial in trials),
-        refusals=refusals_of(unit, unit.participant),
+        refusals=refusals_of(unit, unit.person),
         origins=_origins(unit, usable),
         defaults=unit.shipped_options(),
         loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
@@ -114,26 +112,19 @@ def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
     for path in sorted((unit.out / participant.id).glob("*_refusal-*.parquet")):
         owner = path.name.split("_refusal-")[0]
         label = "" if owner == participant.id else trial_label(owner)
-        found += [
-            Refusal(label, row["stage"], row["sentence"])
-            for _, row in read_artifact(path, "refusal").iterrows()
-            if row["stage"] != unit.stage.name
-        ]
-    return tuple(found)
+        rows = read_artifact(path, "refusal").to_dict("records")
+        found += [Refusal(label, x["stage"], x["sentence"]) for x in rows]
+    return tuple(one for one in found if one.stage != unit.stage.name)
 
 
 def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
-    assert unit.participant is not None
     origins = []
     for kind in unit.stage.inputs:
         if SCHEMAS[kind].level == "participant":
             origins += [origin_of(unit.path(kind), "")] if unit.has(kind) else []
         else:
-            origins += [
-                origin_of(unit.path(kind, trial), trial_label(trial.stem))
-                for trial in unit.participant.trials
-                if trial in usable[kind]
-            ]
+            there = (trial for trial in unit.person.trials if trial in usable[kind])
+            origins += [origin_of(unit.path(kind, one), trial_label(one.stem)) for one in there]
     return tuple(origins)
 
 

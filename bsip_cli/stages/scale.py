@@ -46,18 +46,17 @@ def run(unit: Unit) -> None:
     still = _calibrating_trial(unit, recorded)
     _, quiet = _unrest(still)
     marker_set = _marker_set(unit, still.trial)
-    assert unit.participant is not None
-    sex, height_m = unit.participant.sex, _height_m(unit, recorded)
+    sex, height_m = unit.person.sex, _height_m(unit, recorded)
     tracks = [dict(zip(x.labels, x.positions.swapaxes(0, 1), strict=True)) for x in recorded]
     standing = _mean_positions(still, quiet)
     calibration = calibrate(skeleton, marker_set, standing, sex, height_m, tracks)
     _require_markers(unit, marker_set, calibration.person)
     mass = person_mass(unit, [one.trial for one in recorded], calibration.stature_m)
     if unit.config.marker_set == "auto":
-        unit.warn(f"{unit.name}: marker set {marker_set.name}, recognised by the labels")
+        unit.say(f"marker set {marker_set.name}, recognised by the labels")
         _warn_strangers(unit, marker_set, recorded)
     for note in calibration.notes:
-        unit.warn(f"{unit.name}: {note}")
+        unit.say(note)
     fit = _refine(unit, calibration, recorded, still, quiet)
     kg = mass.mass_kg
     _doubt(unit, doubts_about(fit.person, fit.poses.q, sex, height_m, kg))
@@ -76,12 +75,11 @@ def run(unit: Unit) -> None:
 
 def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
     """As participants.tsv states it, else the first recording that does; None without either."""
-    assert unit.participant is not None
-    if unit.participant.height_m is not None:
-        return unit.participant.height_m
+    if unit.person.height_m is not None:
+        return unit.person.height_m
     for one in recorded:
         if (height_m := unit.facts("markers", one.trial)["stated_height_m"]) is not None:
-            unit.warn(f"{unit.name}: height {height_m:.2f} m, as {one.trial.stem} states it")
+            unit.say(f"height {height_m:.2f} m, as {one.trial.stem} states it")
             return float(height_m)
     return None
 
@@ -96,7 +94,7 @@ def _height_note(recorded: list[_Recorded], stated_m: float | None) -> str:
 def _doubt(unit: Unit, doubts: list[Doubt]) -> None:
     """What no person can be is refused, what few are is said."""
     for one in doubts:
-        unit.warn(f"{unit.name}: is this a person? {words_of([one])}")
+        unit.say(f"is this a person? {words_of([one])}")
     if gross := [one for one in doubts if one.is_gross]:
         raise BadDataError(
             words_of(gross),
@@ -137,8 +135,8 @@ def _warn_strangers(unit: Unit, marker_set: MarkerSet, recorded: list[_Recorded]
     for one in recorded:
         strange = [label for label in one.labels if label not in known]
         if strange:
-            unit.warn(
-                f"{unit.name}: {one.trial.stem} has markers that the calibrating trial's set "
+            unit.say(
+                f"{one.trial.stem} has markers that the calibrating trial's set "
                 f"{marker_set.name} does not know, left out: {', '.join(strange)}"
             )
 
@@ -158,9 +156,7 @@ def _calibrating_trial(unit: Unit, recorded: list[_Recorded]) -> _Recorded:
         if one.trial.role == "static":
             return one
     quietest = min(recorded, key=lambda one: _unrest(one)[0])
-    unit.warn(
-        f"{unit.name}: no static trial; the quietest second of {quietest.trial.stem} calibrates"
-    )
+    unit.say(f"no static trial; the quietest second of {quietest.trial.stem} calibrates")
     return quietest
 
 
@@ -222,8 +218,8 @@ def _warn_missing(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
         segment, parent = skeleton.segments[i], skeleton.segments[skeleton.parents[i]]
         known = marker_set.on(segment)
         serve = f"; {known} would do" if known else ""
-        unit.warn(
-            f"{unit.name}: no markers on the {in_words(segment)}: its joint is held at the neutral "
+        unit.say(
+            f"no markers on the {in_words(segment)}: its joint is held at the neutral "
             f"pose, in line with the {in_words(parent)}{serve}"
         )
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from math import hypot
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -104,25 +106,24 @@ class _Cohort:
         return {"missing": self._missing, "participants": self._participants, "fitted_on": fitted}
 
     def _values_of(self, participant: Participant) -> list[Value]:
-        if refused := _refused(self._unit, participant):
+        before = STAGES[: max(STAGES.index(producer(kind)) for kind in self._unit.stage.reads)]
+        home = self._unit.out / participant.id / f"{participant.id}_refusal-"
+        of_persons = (stage.name for stage in before if stage.level == "participant")
+        if refused := next((s for s in of_persons if Path(f"{home}{s}.parquet").exists()), ""):
+            # whose results are all stale
             self._lacks(f"{participant.id} was refused by {refused}", 1, 2, 3, 4, 5, 6)
             return []
         bsip = self._inertias(participant)
         recordings = list(self._recordings(participant))
         if recordings and not any(recording.role == "sequence" for recording in recordings):
             self._lacks(f"{participant.id} has no identification trial", 2, 3, 6)
-        tests = person_tests("table5", (c for each in recordings for c in correlations(each)))
+        tests = person_tests("table5", (c for each in recordings for c in _correlations(each)))
         self._tests.add(tests)
-        values = list(masses(participant, bsip)) if bsip is not None else []
-        values += [value for recording in recordings for value in values_of(recording)]
-        values += list(centres(participant, bsip)) if bsip is not None else []
-        values += [value for test in tests for value in test.values()]
+        masses, centres = _of_parameters(participant, bsip) if bsip is not None else ([], [])
+        of_trials = [value for recording in recordings for value in _of_recording(recording)]
+        values = [*masses, *of_trials, *centres, *(v for test in tests for v in test.values())]
         self._participants += bool(values)
         self._lines |= {line_of(value): None for value in values if value.method != PAIR}
-        self._count_fitted(values)
-        return values
-
-    def _count_fitted(self, values: list[Value]) -> None:
         data = defaultdict(set)
         for value in values:
             if value.method == OM and value.data:
@@ -130,6 +131,7 @@ class _Cohort:
         for place, found in data.items():
             self._fitted[place]["identification"] += "identification" in found
             self._fitted[place]["everyone"] += 1
+        return values
 
     def _lacks(self, what: str, *numbers: int, is_told: bool = False) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers: the user is told,
@@ -186,18 +188,6 @@ class _Cohort:
         return [test.as_row() for test in found]
 
 
-# --- who is there ---------------------------------------------------------------------------
-
-
-def _refused(unit: Unit, participant: Participant) -> str:
-    """The stage whose refusal makes all of a participant's results stale, or nothing."""
-    folder = unit.path("bsip", participant=participant).parent
-    last = max(STAGES.index(producer(kind)) for kind in unit.stage.reads)
-    before = [stage.name for stage in STAGES[:last] if stage.level == "participant"]
-    names = [s for s in before if (folder / f"{participant.id}_refusal-{s}.parquet").exists()]
-    return names[0] if names else ""
-
-
 # --- one participant's results as tidy values -------------------------------------------------
 
 
@@ -221,36 +211,33 @@ def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
     return frame[frame["method"].isin(methods)].to_dict("records")  # type: ignore[return-value]
 
 
-def masses(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
-    person = (participant.id, "", "all", "", "", "table1")
+def _of_parameters(participant: Participant, bsip: pd.DataFrame) -> tuple[list[Value], list[Value]]:
+    """Masses by method; and how far OM's centres of mass lie from RM's along the segments, as
+    Robert 2017's table 1."""
+    place = (participant.id, "", "all", "", "")
+    masses, apart = [], pd.Series(dtype=float)
     for row in _rows(bsip, *METHODS):
         segment, method = row["segment"], row["method"]
-        yield Value(*person, segment, method, row["mass_kg"], "kg")
+        masses.append(Value(*place, "table1", segment, method, row["mass_kg"], "kg"))
         if method == OM:
-            yield Value(*person, f"{segment}{DATA_SHARE}", OM, row["mass_data_share"], "1")
-
-
-def centres(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
-    """How far OM's centres of mass lie from RM's along the segments, as Robert 2017's table 1."""
+            share = f"{segment}{DATA_SHARE}"
+            masses.append(Value(*place, "table1", share, OM, row["mass_data_share"], "1"))
     along = bsip.pivot_table(index="segment", columns="method", values="com_y_m", sort=False)
-    if not {OM, RM} <= set(along.columns):
-        return
-    apart = (along[OM] - along[RM]).abs() * 1000
+    if {OM, RM} <= set(along.columns):
+        apart = (along[OM] - along[RM]).abs() * 1000
     summary = {"mean": apart.mean(), "median": apart.median(), "max": apart.max()}
-    person = (participant.id, "", "all", "", "", "table6")
-    for name, value in (*apart.items(), *summary.items()):
-        yield Value(*person, f"com_{name}", DIFFERENCE, float(value), "mm")
+    named = [(name, float(x)) for name, x in (*apart.items(), *summary.items()) if len(apart)]
+    centres = [Value(*place, "table6", f"com_{name}", DIFFERENCE, x, "mm") for name, x in named]
+    return masses, centres
 
 
-def values_of(recording: Recording) -> list[Value]:
+def _of_recording(recording: Recording) -> list[Value]:
     values: list[Value] = []
     if "fit" in recording.frames:
         rows = _rows(recording.frames["fit"], *METHODS)
-        fits = {(row["method"], row["component"]): row for row in rows}
         for method in METHODS:
-            values += _cop_errors(recording, method, fits)
-            values += _force_errors(recording, method, fits)
-            values += _residuals(recording, method, fits)
+            fits = {row["component"]: row for row in rows if row["method"] == method}
+            values += _of_fit(recording, method, fits)
     if "posturography" in recording.frames and recording.role == "sequence":
         for row in _rows(recording.frames["posturography"], MEASURED, *METHODS):
             for name, unit in SWAY.items():
@@ -259,44 +246,32 @@ def values_of(recording: Recording) -> list[Value]:
     return values
 
 
-def _cop_errors(recording: Recording, method: str, fits: dict) -> Iterator[Value]:
-    if (method, "cop_ap") not in fits or (method, "cop_ml") not in fits:
-        return
-    ap, ml = fits[method, "cop_ap"], fits[method, "cop_ml"]
-    both = hypot(ap["rmse"], ml["rmse"])
-    for table in ("table2", "table4") if recording.role == "sequence" else ("table4",):
-        yield recording.value(table, "cop_ap", method, ap["rmse"], ap["unit"])
-        yield recording.value(table, "cop_ml", method, ml["rmse"], ml["unit"])
-    yield recording.value("table4", "cop_error", method, both, ap["unit"])
-
-
-def _force_errors(recording: Recording, method: str, fits: dict) -> Iterator[Value]:
-    if (method, "grf_vertical") in fits:
-        percent = fits[method, "grf_vertical"]["rmse_percent_bw"]
+def _of_fit(recording: Recording, method: str, fits: dict[str, dict]) -> Iterator[Value]:
+    """Errors of the centre of pressure, of forces by measure, and as vectors (root mean square);
+    of a method, by component."""
+    is_sequence = recording.role == "sequence"
+    if {"cop_ap", "cop_ml"} <= fits.keys():
+        ap, ml = fits["cop_ap"], fits["cop_ml"]
+        for table in ("table2", "table4") if is_sequence else ("table4",):
+            yield recording.value(table, "cop_ap", method, ap["rmse"], ap["unit"])
+            yield recording.value(table, "cop_ml", method, ml["rmse"], ml["unit"])
+        both = hypot(ap["rmse"], ml["rmse"])
+        yield recording.value("table4", "cop_error", method, both, ap["unit"])
+    if "grf_vertical" in fits:
+        percent = fits["grf_vertical"]["rmse_percent_bw"]
         yield recording.value("table4", "grf_vertical", method, percent, "% body weight")
-    for component in COMPONENTS:
-        row = fits.get((method, component))
-        if row is None:
-            continue
-        for measure in MEASURES:
+    for component, measure in product(COMPONENTS, MEASURES):
+        if (row := fits.get(component)) is not None:
             unit = row["unit"] if measure == "rmse" else "1"
             yield recording.value("table5", f"{component}_{measure}", method, row[measure], unit)
+    if is_sequence and fits.keys() >= set(COMPONENTS):
+        force, moment = (hypot(*(fits[f"{kind}{axis}"]["rmse"] for axis in "xyz")) for kind in "fm")
+        yield recording.value("table6", "force_residual", method, force, "N")
+        yield recording.value("table6", "moment_residual", method, moment, "N m")
 
 
-def _residuals(recording: Recording, method: str, fits: dict) -> Iterator[Value]:
-    """Root mean square of the force's and the moment's error as vectors."""
-    if recording.role != "sequence" or any((method, c) not in fits for c in COMPONENTS):
-        return
-    errors = {c: fits[method, c]["rmse"] for c in COMPONENTS}
-    force, moment = (hypot(*(errors[f"{kind}{axis}"] for axis in "xyz")) for kind in "fm")
-    yield recording.value("table6", "force_residual", method, force, "N")
-    yield recording.value("table6", "moment_residual", method, moment, "N m")
-
-
-def correlations(recording: Recording) -> Iterator[CorrelationRun]:
-    trial, frame = recording.trial, recording.frames.get("correlation-difference")
-    if frame is None:
-        return
+def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
+    trial, frame = recording.trial, recording.frames.get("correlation-difference", pd.DataFrame())
     for row in frame.to_dict("records"):
         if row["component"] not in COMPONENTS or {row["method_a"], row["method_b"]} != {OM, RM}:
             continue

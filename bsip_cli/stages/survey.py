@@ -34,19 +34,18 @@ _HALF = ("half_size_x_m", "half_size_y_m")
 
 def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
-    assert unit.participant is not None
     rows: list[dict] = []
     facts: dict[str, dict[str, float]] = {name: {} for name in _OF_TRIALS}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
-    _say_copies(unit, unit.participant.trials)
-    for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
-        mine = (trial for trial in unit.participant.trials if trial.session == session)
+    _say_copies(unit, unit.person.trials)
+    for session in dict.fromkeys(trial.session for trial in unit.person.trials):
+        mine = (trial for trial in unit.person.trials if trial.session == session)
         seen = [x for x in (_survey(unit, trial, limits) for trial in mine) if x is not None]
         if not seen:
             continue
         heights = [one.height_m for one in seen if one.height_m is not None]
-        if heights and (fault := no_person(max(heights), unit.participant.height_m)):
+        if heights and (fault := no_person(max(heights), unit.person.height_m)):
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         _say_height(unit, seen)
@@ -62,13 +61,12 @@ def run(unit: Unit) -> None:
 
 def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
     """Where the height that participants.tsv states, or else a recording, is not the markers'."""
-    assert unit.participant is not None
     in_files = (one.stated_height_m for one in seen if one.stated_height_m is not None)
-    stated_m = unit.participant.height_m or next(in_files, None)
+    stated_m = unit.person.height_m or next(in_files, None)
     usual = Stature.of_all([one.stature for one in seen])
     if stated_m is not None and usual is not None and (fault := usual.against(stated_m)):
         about = Finding("stated_person", "", *fault, "warning")
-        unit.warn(f"{unit.name}: {about.sentence()}")
+        unit.say(about.sentence())
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
@@ -81,21 +79,20 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
             continue
         one = first.setdefault(content, trial)
         if one is not trial:
-            unit.warn(
-                f"{unit.name}: {trial.path.name} is a copy of {one.path.name}: what is found in "
+            unit.say(
+                f"{trial.path.name} is a copy of {one.path.name}: what is found in "
                 "one is no test of the other; remove one of them"
             )
 
 
 def _survey(unit: Unit, trial: Trial, limits: GateLimits) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
-    assert unit.participant is not None
     try:
         found = opened(unit, trial)
     except BadDataError:
         return None
     seen = TrialSamples.of(found, limits)
-    if seen.height_m is not None and no_person(seen.height_m, unit.participant.height_m):
+    if seen.height_m is not None and no_person(seen.height_m, unit.person.height_m):
         try:
             person_of(found.recording.labels, bones, prefix_of(unit))
         except BadDataError as two:  # people are no giant
@@ -122,8 +119,7 @@ def opened(unit: Unit, trial: Trial) -> Opened:
 
 def prefix_of(unit: Unit) -> str:
     """What the participant's labels begin with where a file holds several people."""
-    assert unit.participant is not None
-    return unit.config.ingest.prefixes.get(unit.participant.id, "")
+    return unit.config.ingest.prefixes.get(unit.person.id, "")
 
 
 def rows_of(session: str, reading: SessionReading) -> list[dict]:
@@ -134,18 +130,11 @@ def rows_of(session: str, reading: SessionReading) -> list[dict]:
 
 
 def _row(verdict: Verdict) -> dict:
-    reading = asdict(verdict.reading)
-    nothing = float("nan")
-    centre = reading.pop("centre_m") or [nothing] * 3
-    half = reading.pop("half_size_m") or [nothing] * 2
-    row = reading | {
-        "reversed_round": reading.pop("mirrored"),
-        **dict(zip((*_CENTRE, *_HALF), (*centre, *half), strict=True)),
-        "refusal": verdict.refusal,
-        "rivals": "|".join(verdict.rivals),
-        "doubted": verdict.doubted,
-        "repeats": " ".join(verdict.repeats),
-    }
+    row, nothing = asdict(verdict.reading), float("nan")
+    places = *(row.pop("centre_m") or [nothing] * 3), *(row.pop("half_size_m") or [nothing] * 2)
+    row |= {"reversed_round": row.pop("mirrored"), "refusal": verdict.refusal}
+    row |= dict(zip((*_CENTRE, *_HALF), places, strict=True)) | {"doubted": verdict.doubted}
+    row |= {"rivals": "|".join(verdict.rivals), "repeats": " ".join(verdict.repeats)}
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
     for when, found in (("before", verdict.before), ("after", verdict.after)):
         row |= {f"{when}_{name}": value for name, value in asdict(found or unknown).items()}
@@ -166,15 +155,9 @@ def _verdict(row: dict) -> Verdict:
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
-    return Verdict(
-        reading,
-        before,
-        after,
-        refusal=row["refusal"],
-        rivals=tuple(filter(None, row["rivals"].split("|"))),
-        doubted=row["doubted"],
-        repeats=tuple(row["repeats"].split()),
-    )
+    rivals, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
+    said = {"refusal": row["refusal"], "doubted": row["doubted"]}
+    return Verdict(reading, before, after, rivals=tuple(rivals), repeats=tuple(repeats), **said)
 
 
 def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:

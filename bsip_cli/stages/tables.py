@@ -12,17 +12,11 @@ from bsip_cli.statistics.cohort import Criteria
 
 
 def run(unit: Unit) -> None:
-    options = unit.config.stats
-    facts = unit.facts("values")
-    tables = build_tables(
-        unit.read("comparisons"),
-        Criteria(options.alpha, options.equivalence_percent),
-        facts["fitted_on"],
-        facts["missing"],
-    )
-    files = []
-    for table in tables:
-        for ending, render in RENDERERS.items():
-            path = folder(unit.out) / f"{table.name}.{ending}"
-            files.append(write_bytes(path, render(table).encode()))
+    options, facts = unit.config.stats, unit.facts("values")
+    criteria, told = Criteria(options.alpha, options.equivalence_percent), unit.read("comparisons")
+    files = [
+        write_bytes(folder(unit.out) / f"{table.name}.{ending}", render(table).encode())
+        for table in build_tables(told, criteria, facts["fitted_on"], facts["missing"])
+        for ending, render in RENDERERS.items()
+    ]
     unit.write("tables-files", file_rows(unit.out, files))

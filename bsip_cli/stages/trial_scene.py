@@ -88,21 +88,14 @@ def plates_of(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
     for number in plate_names(wrench):
         reading = wrench[[f"plate{number}_{c}" for c in WRENCH]].to_numpy()
         place = outline(corners, number)
-        if place is None:
-            place = _about_load(reading)
+        loaded = np.nan_to_num(reading[:, 2]) > _LOADED_N
+        if place is None and loaded.any():  # a square in the lab's axes about the mean load
+            force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
+            middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
+            place = middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
         if place is not None:
             found.append(Plate(number, place, reading))
     return tuple(found)
-
-
-def _about_load(reading: np.ndarray) -> np.ndarray | None:
-    """(4, 3) corners of a square in the lab's axes about the mean centre of pressure."""
-    loaded = np.nan_to_num(reading[:, 2]) > _LOADED_N
-    if not loaded.any():
-        return None
-    force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
-    middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
-    return middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
 
 
 # --- the causes that the diagnosis of a person named, as science takes them -----------------------

@@ -1,4 +1,4 @@
-"""Which parameters follow the measured forces best: errors of methods compared in pairs.
+"""Errors compared: which parameters follow the measured forces best, and what a correction gains.
 
 The error of a method in a trial is the geometric mean of the RMSE in all components, so that
 newtons, newton metres and millimetres count alike; two methods are compared by the difference of
@@ -97,3 +97,70 @@ def _log_error(residuals: np.ndarray, stretches: Stretches) -> tuple[float, np.n
     slopes = 0.5 * np.nan_to_num(squares / means - 1) * frames / counts
     slopes[~np.isfinite(squares).any(axis=1)] = np.nan
     return float(0.5 * np.log(means).mean()), slopes.mean(axis=1)
+
+
+# --- how much smaller an error becomes, with an interval from whole blocks of time ----------------
+
+
+_DRAWS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class BlockErrors:
+    """Squared errors before and after, summed per block (b,), and the number of samples (b,)."""
+
+    before: np.ndarray
+    after: np.ndarray
+    samples: np.ndarray
+
+
+@dataclass(frozen=True)
+class ErrorGain:
+    """Root-mean-square errors, and by what part the second is smaller [%]; NaN without samples."""
+
+    rmse_before: float
+    rmse_after: float
+    percent: float
+    ci_low: float
+    ci_high: float
+
+
+def block_errors(
+    measured: np.ndarray, before: np.ndarray, after: np.ndarray, blocks: np.ndarray
+) -> BlockErrors:
+    """Sums over the samples (n,) at which all three signals are finite.
+
+    blocks : (n,) number of the block of each sample.
+    """
+    known = np.isfinite(measured) & np.isfinite(before) & np.isfinite(after)
+    _, place = np.unique(blocks[known], return_inverse=True)
+    left, right = (((one - measured)[known]) ** 2 for one in (before, after))
+    return BlockErrors(
+        np.bincount(place, left), np.bincount(place, right), np.bincount(place).astype(float)
+    )
+
+
+def pooled(parts: list[BlockErrors]) -> BlockErrors:
+    """The blocks of several trials."""
+    sums = zip(*((one.before, one.after, one.samples) for one in parts), strict=True)
+    return BlockErrors(*map(np.concatenate, sums))
+
+
+def error_gain(errors: BlockErrors, rng: np.random.Generator) -> ErrorGain:
+    """Gain over all blocks; its 95 % interval from blocks drawn with replacement."""
+    number = len(errors.samples)
+    if number == 0:
+        return ErrorGain(*[np.nan] * 5)
+    before, after, samples = (x.sum() for x in (errors.before, errors.after, errors.samples))
+    low, high = np.nan, np.nan
+    if number > 1:
+        drawn = rng.integers(0, number, (_DRAWS, number))
+        gains = _percent(errors.before[drawn].sum(axis=1), errors.after[drawn].sum(axis=1))
+        low, high = np.percentile(gains, [2.5, 97.5])
+    rmse = np.sqrt(before / samples), np.sqrt(after / samples)
+    return ErrorGain(*map(float, (*rmse, _percent(before, after), low, high)))
+
+
+def _percent(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Of squared errors: by what part the root is smaller [%]."""
+    return 100 * (1 - np.sqrt(after / before))

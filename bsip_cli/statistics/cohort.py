@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from math import isnan, nan
@@ -262,8 +262,6 @@ def methods_beside_each_other(
     The one-way takes the methods for groups of different people; that of repeated measures is
     what the design asks for.
 
-    Parameters
-    ----------
     table : shape (participants, methods), in the topic's unit.
     """
     table = table[np.isfinite(table).all(axis=1)]
@@ -308,70 +306,36 @@ def _pair_numbers(
 def tests_of(values: Iterable[Value], criteria: Criteria) -> Iterator[Comparison]:
     """Every test of the topics that these values belong to; all of a topic's must be there."""
     for topic, group in topics(v for v in values if v.method != PAIR).items():
-        yield from _TABLES[topic.table](topic, group, criteria)
+        yield from _tests_of_topic(topic, group, criteria)
 
 
-def _segment_mass(
+def _tests_of_topic(
     topic: Topic, values: Sequence[Value], criteria: Criteria
 ) -> Iterator[Comparison]:
-    if topic.variable.endswith(DATA_SHARE):
-        yield description(topic, OM, values)
-        return
-    for pair in pairs_of(topic, values, "published"):
-        yield from t_and_rank_tests(pair, criteria.alpha)
-        yield equivalence(pair, criteria)
-
-
-def _errors(origin: Origin) -> Callable[[Topic, Sequence[Value], Criteria], Iterator[Comparison]]:
-    def tests(topic: Topic, values: Sequence[Value], criteria: Criteria) -> Iterator[Comparison]:
-        for pair in pairs_of(topic, values, origin):
-            yield from t_and_rank_tests(pair, criteria.alpha)
-            yield smaller_error(pair)
-
-    return tests
-
-
-def _posturography(
-    topic: Topic, values: Sequence[Value], criteria: Criteria
-) -> Iterator[Comparison]:
-    """The published groups; RM+mass, whose centre of pressure is RM's, is no fourth."""
-    methods = (MEASURED, OM, RM)
-    table = per_participant(values, methods)
-    yield from methods_beside_each_other(topic, table, methods, criteria.alpha)
-    for pair in pairs_of(topic, values, "added"):
-        if pair.rival != RM:
-            yield from t_and_rank_tests(pair, criteria.alpha)
-
-
-def _six_components(
-    topic: Topic, values: Sequence[Value], criteria: Criteria
-) -> Iterator[Comparison]:
-    if topic.variable.endswith("_rmse"):
-        yield from _errors("added")(topic, values, criteria)
-    else:
-        for pair in pairs_of(topic, values, "published"):  # no test, but means and SDs
+    table, alpha = topic.table, criteria.alpha
+    only_described = table == "table5" and not topic.variable.endswith("_rmse")
+    is_published = table in ("table1", "table2") or only_described
+    for method, is_it in (
+        (OM, topic.variable.endswith(DATA_SHARE)),
+        (DIFFERENCE, all(value.method == DIFFERENCE for value in values)),
+    ):
+        if is_it:
+            yield description(topic, method, values)
+            return
+    if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
+        methods = (MEASURED, OM, RM)
+        columns = per_participant(values, methods)
+        yield from methods_beside_each_other(topic, columns, methods, alpha)
+    for pair in pairs_of(topic, values, "published" if is_published else "added"):
+        if only_described:  # means and SDs
             means = described_pair(*finite_pairs(pair.x, pair.y))
             yield pair.row("description", pair.origin, means)
-
-
-def _table_or_identified(
-    topic: Topic, values: Sequence[Value], criteria: Criteria
-) -> Iterator[Comparison]:
-    if all(value.method == DIFFERENCE for value in values):
-        yield description(topic, DIFFERENCE, values)
-        return
-    for pair in pairs_of(topic, values, "added"):
-        yield from t_and_rank_tests(pair, criteria.alpha)
-
-
-_TABLES: dict[str, Callable[[Topic, Sequence[Value], Criteria], Iterator[Comparison]]] = {
-    "table1": _segment_mass,
-    "table2": _errors("published"),
-    "table3": _posturography,
-    "table4": _errors("added"),
-    "table5": _six_components,
-    "table6": _table_or_identified,
-}
+        elif table != "table3" or pair.rival != RM:
+            yield from t_and_rank_tests(pair, alpha)
+            if table == "table1":
+                yield equivalence(pair, criteria)
+            elif table in ("table2", "table4", "table5"):
+                yield smaller_error(pair)
 
 
 # --- does OM follow the measured signal better than RM? One test per participant, then counts -----

@@ -55,16 +55,10 @@ def fit_measures(
     centred: for a signal with a large mean, such as the vertical force, P stays small whatever
     the phase.
 
-    Parameters
-    ----------
     measured, computed : shape (n,), one unit. Rows in which either is not finite are left out.
     stretches : half-open index pairs of the samples to compare, None for all.
     body_weight_N : mass times g; None if the signals are no forces.
-
-    Raises
-    ------
-    ValueError
-        if the shapes differ or the stretches do not fit them.
+    ValueError: if the shapes differ or the stretches do not fit them.
     """
     measured, computed = np.asarray(measured, dtype=float), np.asarray(computed, dtype=float)
     parts = finite_stretches(stretches, measured, computed)
@@ -139,16 +133,10 @@ def posturography(
     posturography, Gait & Posture 39; exact for long recordings, Duarte 2015, ibid. 41). It is
     not the confidence ellipse of the mean, which shrinks as the recording gets longer.
 
-    Parameters
-    ----------
     cop_ap_m, cop_ml_m : shape (n,), in m. Samples in which either is not finite are gaps.
     rate_hz : samples per second.
     stretches : half-open index pairs of the samples to use, None for all.
-
-    Raises
-    ------
-    ValueError
-        if rate_hz is not positive, the shapes differ or the stretches do not fit them.
+    ValueError: if rate_hz is not positive, the shapes differ or the stretches do not fit them.
     """
     if not rate_hz > 0.0:
         raise ValueError(f"rate_hz must be positive, not {rate_hz}")

@@ -88,9 +88,9 @@ def paired_t(x: ArrayLike, y: ArrayLike, confidence: float = 0.95) -> TestResult
 
 
 def _tested(found: TestResult, test: Any, interval: Any, p_value: float) -> TestResult:
-    numbers = {"statistic": test.statistic, "df1": test.df, "p_value": p_value}
-    numbers |= {"ci_low": interval.low, "ci_high": interval.high}
-    return found.with_(**{name: float(number) for name, number in numbers.items()})
+    names = ("statistic", "df1", "p_value", "ci_low", "ci_high")
+    numbers = map(float, (test.statistic, test.df, p_value, interval.low, interval.high))
+    return found.with_(**dict(zip(names, numbers, strict=True)))
 
 
 def d_of_differences(x: ArrayLike, y: ArrayLike) -> float:
@@ -141,15 +141,9 @@ def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.
     Statistic and p are those of the weaker side. The interval is the one at 1 - 2 alpha that
     belongs to the test: x and y are equivalent if it lies within -bound .. bound.
 
-    Parameters
-    ----------
     bound : half-width of the range that counts as equal, in the unit of x, positive.
     alpha : level of each one-sided test.
-
-    Raises
-    ------
-    ValueError
-        if x and y differ in shape.
+    ValueError: if x and y differ in shape.
     """
     x, y = finite_pairs(x, y)
     difference = x - y
@@ -207,22 +201,16 @@ def _hodges_lehmann(whole: NDArray[np.int64]) -> float:
 
     The pairs are counted, not formed: those of a large cohort would fill the memory.
     """
-    ordered = np.sort(whole)
-    count = len(ordered) * (len(ordered) + 1) // 2
-    middle = (_pair_sum(ordered, (count + 1) // 2), _pair_sum(ordered, count // 2 + 1))
-    return sum(middle) / 4.0
-
-
-def _pair_sum(ordered: NDArray[np.int64], number: int) -> int:
-    """The sum of a pair than which ``number - 1`` pairs have none that is larger."""
-    own = np.arange(len(ordered))
+    ordered, own = np.sort(whole), np.arange(len(whole))
 
     def pairs_up_to(total: int) -> int:
         partners = np.searchsorted(ordered, total - ordered, side="right") - own
         return int(np.maximum(partners, 0).sum())
 
+    count = len(ordered) * (len(ordered) + 1) // 2
     sums = range(2 * int(ordered[0]), 2 * int(ordered[-1]) + 1)
-    return sums[bisect_left(sums, number, key=pairs_up_to)]
+    places = (bisect_left(sums, k, key=pairs_up_to) for k in ((count + 1) // 2, count // 2 + 1))
+    return sum(sums[place] for place in places) / 4.0
 
 
 # --- more than two methods: one-way analysis of variance, and the one for repeated measures -------
@@ -237,8 +225,6 @@ def one_way_anova(groups: Sequence[ArrayLike], alpha: float = 0.05) -> tuple[Tes
     The post hoc t tests share the pooled variance and its degrees of freedom, as in SPSS and in
     R's pairwise.t.test; p and intervals are corrected for their number.
 
-    Parameters
-    ----------
     groups : two or more samples of shape (n_i,), one unit. Values that are not finite are dropped.
     alpha : the post hoc intervals hold together at 1 - alpha.
     """
@@ -259,15 +245,24 @@ def one_way_anova(groups: Sequence[ArrayLike], alpha: float = 0.05) -> tuple[Tes
     pooled = np.concatenate(samples)
     ss_within = float(sum(np.sum((sample - sample.mean()) ** 2) for sample in samples))
     ss_total = float(np.sum((pooled - pooled.mean()) ** 2))
-    df_within = float(len(pooled) - len(samples))
+    df = float(len(pooled) - len(samples))
     f, p = stats.f_oneway(*samples)
-    return found.with_(
+    found = found.with_(
         statistic=float(f),
         df1=float(len(samples) - 1),
-        df2=df_within,
+        df2=df,
         p_value=float(p),
         effect_size=1.0 - ss_within / ss_total,
-    ), _pooled_post_hoc(samples, ss_within / df_within, df_within, alpha)
+    )
+    pairs, after = list(combinations(range(len(samples)), 2)), {}
+    critical = float(stats.t.isf(alpha / 2.0 / len(pairs), df))
+    for i, j in pairs:
+        d = float(samples[i].mean() - samples[j].mean())
+        e = sqrt(ss_within / df * (1.0 / sizes[i] + 1.0 / sizes[j]))
+        p = 2.0 * float(stats.t.sf(abs(d) / e, df))
+        one = TestResult(difference=d, statistic=d / e, df1=df, p_value=p)
+        after[i, j] = one.with_(ci_low=d - critical * e, ci_high=d + critical * e)
+    return found, _bonferroni(after)
 
 
 def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[TestResult, PostHoc]:
@@ -277,16 +272,10 @@ def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[Tes
     (Greenhouse and Geisser 1959, Psychometrika 24; Box 1954); p is at epsilon times both degrees
     of freedom. Partial eta squared = SS effect / (SS effect + SS error).
 
-    Parameters
-    ----------
     matrix : shape (n, k), one row per participant. Rows with a value that is not finite are
         dropped; n says how many are left.
     alpha : the post hoc intervals hold together at 1 - alpha.
-
-    Raises
-    ------
-    ValueError
-        if matrix is not two-dimensional.
+    ValueError: if matrix is not two-dimensional.
     """
     table = np.asarray(matrix, dtype=float)
     if table.ndim != 2:
@@ -331,21 +320,6 @@ def _doubly_centred(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return table - rows - columns + table.mean()
 
 
-def _pooled_post_hoc(
-    samples: Sequence[NDArray[np.float64]], variance: float, df: float, alpha: float
-) -> PostHoc:
-    pairs = list(combinations(range(len(samples)), 2))
-    critical = float(stats.t.isf(alpha / 2.0 / len(pairs), df))
-    found = {}
-    for i, j in pairs:
-        d = float(samples[i].mean() - samples[j].mean())
-        e = sqrt(variance * (1.0 / len(samples[i]) + 1.0 / len(samples[j])))
-        p, ends = 2.0 * float(stats.t.sf(abs(d) / e, df)), (d - critical * e, d + critical * e)
-        one = TestResult(difference=d, statistic=d / e, df1=df, p_value=p)
-        found[i, j] = one.with_(ci_low=ends[0], ci_high=ends[1])
-    return _bonferroni(found)
-
-
 def _bonferroni(tests: PostHoc) -> PostHoc:
     adjusted = adjusted_p_values([test.p_value for test in tests.values()], "bonferroni")
     pairs = zip(tests.items(), adjusted, strict=True)
@@ -364,8 +338,6 @@ def williams_t(r_mc1: float, r_mc2: float, r_c1c2: float, n: float) -> TestResul
     (1 - r_c1c2)^3)) with n - 3 degrees of freedom, |R| the determinant of the three
     correlations (Williams 1959; Steiger 1980, Psychological Bulletin 87, eq. 7); two-sided.
 
-    Parameters
-    ----------
     r_mc1, r_mc2 : correlation of the measured with each computed signal.
     r_c1c2 : correlation of the two computed signals.
     n : independent samples; of two effective numbers the smaller.

@@ -106,8 +106,6 @@ def lilliefors_test(x: ArrayLike) -> TestResult:
     Lilliefors 1967 (J. Am. Stat. Assoc. 62), as in Hansen 2017 (Statistical analyses); p from
     the simulated table of statsmodels, which ends at 0.001 and 0.99.
 
-    Parameters
-    ----------
     x : shape (n,), any unit; for a paired t test the differences. Values that are not finite
         are dropped; n says how many are left.
     """
@@ -152,8 +150,6 @@ def finite_pairs(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArr
 def is_constant(values: NDArray[np.float64], *, beside: float = 0.0) -> bool:
     """Whether the values vary by no more than rounding.
 
-    Parameters
-    ----------
     values : shape (n,), n > 0.
     beside : largest magnitude of what the values were computed from, in their unit; the
         difference of two large numbers carries their rounding.
@@ -195,15 +191,9 @@ def finite_stretches(
 ) -> list[tuple[int, int]]:
     """The given stretches, split where any of the signals is not finite.
 
-    Parameters
-    ----------
     stretches : half-open index pairs, or None for the whole signals.
     signals : one or more arrays of the same shape (n,).
-
-    Raises
-    ------
-    ValueError
-        if the signals differ in shape, or the stretches overlap, run backwards or leave the
+    ValueError: if the signals differ in shape, or the stretches overlap, run backwards or leave the
         signals: a mistake of the caller, not of the data.
     """
     n = len(signals[0])
@@ -251,15 +241,10 @@ def effective_samples(x: ArrayLike, stretches: Stretches | None = None) -> float
     Markov chain Monte Carlo, Statistical Science 7, section 3.3). The rule stops at the first
     negative swing of an oscillating series, so it counts rather too few samples than too many.
 
-    Parameters
-    ----------
     x : shape (n,), any unit. Samples that are not finite are gaps.
     stretches : half-open index pairs to use, None for all. Positions count as time: pairs of
         samples across a gap enter at their true lag.
-
-    Returns
-    -------
-    float between 0 and n; nan for fewer than four samples or a constant series.
+    Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     series = np.asarray(x, dtype=float)
     parts = finite_stretches(stretches, series)
@@ -286,14 +271,9 @@ def effective_samples_of_pair(
     first lag of five integrated correlation times (Sokal 1997, section 3): unlike the sign rule
     for one series, this is not fooled by two oscillations that cross zero a frame apart.
 
-    Parameters
-    ----------
     x, y : shape (n,), any units. Rows in which either is not finite are gaps.
     stretches : as in `effective_samples`.
-
-    Returns
-    -------
-    float between 0 and n; nan for fewer than four samples or if either series is constant.
+    Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     parts = finite_stretches(stretches, first, second)

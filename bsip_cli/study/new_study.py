@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bsip_cli.study.participants import NAME
-
 STILL_M_S = 0.1
 """Mean speed of markers over half a second: people who stand sway by centimetres a second, in slow
 movements the limbs go several times faster."""
@@ -128,7 +126,11 @@ def _people(recordings: Sequence[Found], notes: list[str]) -> dict[str, list[Fou
         for key, own in _in_one_folder(inside, notes).items():
             for part in _of_one_marker_set(own, notes):
                 wished = key or folder
-                named.setdefault(_free(wished, named, own), []).extend(part)
+                letters = "" if wished.startswith("?") else plain(wished)
+                numbers = (f"sub-{letters}{k:02d}" for k in range(1, len(named) + 2))
+                names = [*([f"sub-{letters}"] if letters else []), *numbers]
+                known = {name.casefold() for name in named}
+                named[next(name for name in names if name.casefold() not in known)] = part
     return dict(sorted(named.items()))
 
 
@@ -180,7 +182,7 @@ def _shown_name(subject: str, groups: Mapping[str, Sequence[Found]]) -> str:
 
 
 def _first(stem: str) -> str:
-    return _parts(stem)[0] if _parts(stem) else ""
+    return next(iter(_parts(stem)), "")
 
 
 def _glued(stem: str) -> str:
@@ -189,18 +191,12 @@ def _glued(stem: str) -> str:
     return match[0] if match else ""
 
 
-def _last(stem: str) -> str:
-    """S01 of static_S01; numbers alone are runs."""
-    last = _parts(stem)[-1] if _parts(stem) else ""
-    return last if re.search("[A-Za-z]", last) else ""
-
-
 _GUESSES: Mapping[str, Callable[[str], str]] = {
     "begin": _first,
     "begin, before other letters": _glued,
-    "end": _last,
+    "end": lambda stem: next((p for p in _parts(stem)[-1:] if re.search("[A-Za-z]", p)), ""),
 }
-"""Where in a file's name its person may stand."""
+"""Where in a file's name its person may stand; at the end numbers alone are runs."""
 
 
 def _are_people(guessed: Sequence[str], recordings: Sequence[Found]) -> bool:
@@ -239,23 +235,15 @@ def _of_one_marker_set(recordings: Sequence[Found], notes: list[str]) -> list[li
     return [sorted(part, key=lambda one: one.path) for part in parts]
 
 
-def _free(wished: str, taken: Mapping[str, object], own: Sequence[Found]) -> str:
-    """A participant_id that is not taken: of the wished letters, else a number."""
-    letters = "" if wished.startswith("?") else plain(wished)
-    known = {name.casefold() for name in taken}
-    if letters and f"sub-{letters}".casefold() not in known:
-        return f"sub-{letters}"
-    numbers = (f"sub-{letters}{k:02d}" for k in range(1, len(known) + 2))
-    return next(name for name in numbers if name.casefold() not in known)
-
-
 # --- what -----------------------------------------------------------------------------------------
 
 
 def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Named]:
     """The trials of one person, each with a name of its own."""
     rests = _without_common([_rest(one.stem, participant) for one in own])
-    rests = [rest or _sorting_folder(one) for one, rest in zip(own, rests, strict=True)]
+    for k, one in enumerate(own):  # a folder says what it shows where its name does not
+        sorting = [f for f in one.folders if _only_sorts(f) and re.search(r"[A-Za-z]", f)]
+        rests[k] = rests[k] or sorting[-1:]
     static = _static(participant, own, notes)
     taken: set[tuple[str, str, int]] = set()
     named = []
@@ -298,13 +286,6 @@ def _is_called_static(stem: str) -> bool:
 
 def _is_in_static_folder(one: Found) -> bool:
     return any(not _STATIC.isdisjoint(words(folder)) for folder in one.folders)
-
-
-def _sorting_folder(one: Found) -> list[str]:
-    """The folder that says what a recording shows whose own name says only whose it is."""
-    return [
-        folder for folder in one.folders if _only_sorts(folder) and re.search(r"[A-Za-z]", folder)
-    ][-1:]
 
 
 def _only_sorts(folder: str) -> bool:
@@ -387,12 +368,6 @@ def words(text: str) -> list[str]:
     split = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", folded)
     whole = re.findall(r"[A-Za-z]+", folded)
     return list(dict.fromkeys(word.lower() for word in (*split, *whole)))
-
-
-def check_participant(name: str) -> str:
-    """A wished name as a participant_id; empty where it cannot be one."""
-    wished = name if name.startswith("sub-") else f"sub-{name}"
-    return wished if NAME.fullmatch(wished) else ""
 
 
 def counted(names: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError, UsageError
@@ -23,7 +24,7 @@ from bsip_cli.stated.quantities import (
     readings_of,
 )
 from bsip_cli.stated.sex_words import COLUMN_NAMES, Sex, legend_in, legend_of, sex_of
-from bsip_cli.study.text_table import TextTable, read_text_table
+from bsip_cli.study.text_table import read_text_table
 from bsip_cli.study.trials import MANY, Trial
 
 # --- which column of participants.tsv is which, and what header and participants.json say of it ---
@@ -70,15 +71,15 @@ class Columns:
     faults: tuple[str, ...]
 
 
-def count_known(header: Sequence[str]) -> int:
-    """How many of the contract's columns are among some titles."""
-    return len({column.name for k, title in enumerate(header) if (column := _column(k, title))})
+def columns_in(header: Sequence[str]) -> list[Column]:
+    """All columns that are understood; the others are nobody's business."""
+    return [column for k, title in enumerate(header) if (column := _column(k, title))]
 
 
 def columns_of(header: Sequence[str]) -> Columns:
-    """The columns of a table by its titles; those that are not understood are nobody's business."""
+    """The columns of a table by its titles, and what is wrong with these."""
     faults, known = [], {}
-    found = [column for k, title in enumerate(header) if (column := _column(k, title))]
+    found = columns_in(header)
     for name in KNOWN:
         own = [column for column in found if column.name == name]
         exact = [column for column in own if column.title == name]
@@ -92,8 +93,8 @@ def columns_of(header: Sequence[str]) -> Columns:
     others = [t for k, t in enumerate(header) if k not in {c.index for c in found}]
     near = _misspelt(others, [name for name in KNOWN if name not in known])
     faults += [f"has a column {title!r} and no {name}" for title, name in near]
-    lacking = [n for n in REQUIRED if n not in {*known, *(c.name for c in found)}]
-    if lost := [name for name in lacking if name not in {name for _, name in near}]:
+    told = {*known, *(c.name for c in found), *(name for _, name in near)}
+    if lost := [name for name in REQUIRED if name not in told]:
         faults.append(f"has no column {', '.join(lost)}")
     return Columns(known, tuple(faults))
 
@@ -153,7 +154,11 @@ def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
         if not isinstance(about, dict):
             continue
         if name == "sex" and not column.legend and isinstance(levels := about.get("Levels"), dict):
-            known[name] = replace(column, legend=legend_of(_plain(levels)))
+            plain = {  # texts, also where BIDS allows an object with a description
+                str(code): str(text.get("Description", "") if isinstance(text, dict) else text)
+                for code, text in levels.items()
+            }
+            known[name] = replace(column, legend=legend_of(plain))
         if name in _QUANTITIES and isinstance(text := about.get("Units"), str):
             unit = _QUANTITIES[name].unit_spelt(text)
             if column.unit and unit not in ("", column.unit):
@@ -164,14 +169,6 @@ def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
                 faults.append(f"has a column {column.title!r}, whose unit {text!r} is not known")
             known[name] = replace(column, unit=column.unit or unit)
     return Columns(known, tuple(faults)), []
-
-
-def _plain(levels: Mapping) -> dict[str, str]:
-    """Levels as texts, also where BIDS allows an object with a description."""
-    return {
-        str(code): str(text.get("Description", "") if isinstance(text, dict) else text)
-        for code, text in levels.items()
-    }
 
 
 # --------------------------------------------------------------------------------------------------
@@ -253,7 +250,7 @@ def read_people(file: Path) -> PeopleTable:
     BadDataError
         It cannot be read, is no such table or lacks a column: all faults of its header at once.
     """
-    table = read_text_table(file, count_known)
+    table = read_text_table(file, lambda names: len({c.name for c in columns_in(names)}))
     if not table.rows:
         raise _header_fault(file, ["names no participant"])
     columns, notes = with_sidecar(columns_of(table.header), file.with_suffix(".json"))
@@ -266,7 +263,10 @@ def read_people(file: Path) -> PeopleTable:
         rows.append(Row(_id_of(written, file.parent), cells))
         if written.isdigit() and rows[-1].id not in (written, f"sub-{written}"):
             renamed.append(f"{written} is {rows[-1].id}")
-    notes = [*_how_read(file, table), *notes]
+    tabs, is_utf = table.separator == "tabs", table.encoding != "cp1252"
+    odd = [] if tabs else [f"its cells are separated by {table.separator}"]
+    odd += [] if is_utf else ["it is no UTF-8 and was read as Windows-1252 (Latin-1)"]
+    notes = [*([f"{file}: {' and '.join(odd)}"] if odd else []), *notes]
     if renamed:
         notes.append(f"{file}: {', '.join(renamed)}, by their folders")
     width, separator = len(table.header), table.separator
@@ -280,16 +280,6 @@ def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:
         expected=f"{', '.join(KNOWN)}, separated by tabs",
         remedy="add what is lacking, and give the columns that count these names",
     )
-
-
-def _how_read(file: Path, table: TextTable) -> list[str]:
-    """What of the dialect differs from tab-separated UTF-8."""
-    said = []
-    if table.separator != "tabs":
-        said.append(f"its cells are separated by {table.separator}")
-    if table.encoding == "cp1252":
-        said.append("it is no UTF-8 and was read as Windows-1252 (Latin-1)")
-    return [f"{file}: {' and '.join(said)}"] if said else []
 
 
 def _id_of(written: str, root: Path) -> str:
@@ -323,13 +313,12 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
         )
     if len(row.cells) != table.width:
         is_split = table.separator == "commas" and len(row.cells) > table.width
+        points = "write points for decimal commas"
         raise BadDataError(
             f"the line of {row.id!r} has {len(row.cells)} cells",
             file=table.file,
             expected=f"{table.width}, as many as there are columns",
-            remedy="write points for decimal commas"
-            if is_split
-            else "write n/a where something is unknown",
+            remedy=points if is_split else "write n/a where something is unknown",
         )
     cells = {name: row.cells[column.index] for name, column in table.columns.items()}
     sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
@@ -338,7 +327,13 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
     _settle(mass, height)
     faults += [one.fault(row.id) for one in (mass, height) if one.is_lost]
     if faults:
-        raise _row_fault(table.file, faults)
+        found, expected, remedies = zip(*faults, strict=True)
+        raise BadDataError(
+            "; ".join(found),
+            file=table.file,
+            expected="; ".join(expected),
+            remedy="; ".join(dict.fromkeys(remedies)),
+        )
     notes = [f"{table.file}: {note}" for one in (mass, height) for note in one.notes(row.id)]
     if odd := odd_pair(mass.value, height.value):
         notes.append(f"{table.file}: {row.id}: {odd}")
@@ -348,16 +343,6 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
 
 _Clauses = tuple[str, str, str]
 """What was found, what was expected, what to do."""
-
-
-def _row_fault(file: Path, faults: Sequence[_Clauses]) -> BadDataError:
-    found, expected, remedies = zip(*faults, strict=True)
-    return BadDataError(
-        "; ".join(found),
-        file=file,
-        expected="; ".join(expected),
-        remedy="; ".join(dict.fromkeys(remedies)),
-    )
 
 
 def _sex_fault(text: str, name: str) -> _Clauses:
@@ -417,10 +402,8 @@ def _settle(mass: _Found, height: _Found) -> None:
     """Of several units keep those with which mass and height are of one person."""
     if not mass.readings or not height.readings:
         return
-    pairs = [
-        (m, h) for m in mass.readings for h in height.readings if is_usual_pair(m.value, h.value)
-    ]
-    if len(mass.readings) > 1:
-        mass.readings = tuple(dict.fromkeys(m for m, _ in pairs)) or mass.readings
-    if len(height.readings) > 1:
-        height.readings = tuple(dict.fromkeys(h for _, h in pairs)) or height.readings
+    both = product(mass.readings, height.readings)
+    pairs = [(m, h) for m, h in both if is_usual_pair(m.value, h.value)]
+    for k, one in enumerate((mass, height)):
+        if len(one.readings) > 1:
+            one.readings = tuple(dict.fromkeys(pair[k] for pair in pairs)) or one.readings

@@ -6,6 +6,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -87,7 +88,13 @@ class _Loading:
         try:
             person = participant_of(row, self.table)
             if (known := self.participants.get(person.id.casefold())) is not None:
-                raise self._twice(person.id, known.id)
+                other = "" if person.id == known.id else f", in other capitals as {known.id}"
+                raise BadDataError(
+                    f"{person.id} stands twice{other}",
+                    file=self.root / "participants.tsv",
+                    expected="a line per participant; the first one counts",
+                    remedy="remove one",
+                )
             _check_folder(self.root, person.id)
             found = find_trials(self.root / person.id, person.id, self.roles)
         except BadDataError as refusal:
@@ -100,14 +107,6 @@ class _Loading:
         if found.trials:
             person = replace(person, trials=tuple(found.trials))
             self.participants[person.id.casefold()] = person
-
-    def _twice(self, name: str, known: str) -> BadDataError:
-        return BadDataError(
-            f"{name} stands twice" + ("" if name == known else f", in other capitals as {known}"),
-            file=self.root / "participants.tsv",
-            expected="a line per participant; the first one counts",
-            remedy="remove one",
-        )
 
     def look_around(self, named: set[str]) -> None:
         """What lies beside the folders of those whom participants.tsv names."""
@@ -228,37 +227,24 @@ def describe_dataset(out: Path, study: Path) -> str:
     UsageError
         It cannot be written.
     """
+    what = "body segment inertial parameters from motion and ground forces"
     description = {
         "Name": f"bsip results of {study.resolve().name}",
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "derivative",
-        "GeneratedBy": [
-            {
-                "Name": "bsip",
-                "Version": __version__,
-                "Description": "body segment inertial parameters from motion and ground forces",
-            }
-        ],
+        "GeneratedBy": [{"Name": "bsip", "Version": __version__, "Description": what}],
     }
     text = json.dumps(description, indent=2) + "\n"
     path = out / DESCRIPTION
     if os.path.lexists(path):
-        found = _own_text(path)
-        if found is None:
+        found, is_own = "", False
+        with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+            if not (path.is_symlink() or fault_of(path)):
+                found = path.read_text(encoding="utf-8")
+                is_own = any(one["Name"] == "bsip" for one in json.loads(found)["GeneratedBy"])
+        if not is_own:
             return f"{path}: is not of bsip, and stays as it is"
         if found == text:
             return ""
     write_bytes(path, text.encode())
     return ""
-
-
-def _own_text(path: Path) -> str | None:
-    """What a description says that bsip wrote; None of any other."""
-    try:
-        if path.is_symlink() or fault_of(path):
-            return None
-        text = path.read_text(encoding="utf-8")
-        is_own = any(one["Name"] == "bsip" for one in json.loads(text)["GeneratedBy"])
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return None
-    return text if is_own else None

@@ -72,7 +72,10 @@ def _text(file: Path) -> tuple[str, str]:
             raw = handle.read()
     except OSError as error:
         raise _unreadable(file, f"cannot be read ({error.strerror or error})") from None
-    encoding = _encoding(raw)
+    even, odd = raw[::2].count(0), raw[1::2].count(0)
+    encoding = next((name for mark, name in _BOMS.items() if raw.startswith(mark)), "utf-8")
+    if encoding == "utf-8" and min(even, odd) == 0 and max(even, odd) > _MOSTLY_ZERO * len(raw):
+        encoding = "utf-16-be" if even else "utf-16-le"
     try:
         return raw.decode(encoding), encoding
     except UnicodeDecodeError as error:
@@ -80,16 +83,6 @@ def _text(file: Path) -> tuple[str, str]:
         if encoding != "utf-8" or _CONTROL.search(text):
             raise _no_text(file, str(error)) from None
         return text, "cp1252"
-
-
-def _encoding(raw: bytes) -> str:
-    for mark, name in _BOMS.items():
-        if raw.startswith(mark):
-            return name
-    even, odd = raw[::2].count(0), raw[1::2].count(0)
-    if min(even, odd) == 0 and max(even, odd) > _MOSTLY_ZERO * len(raw):
-        return "utf-16-be" if even else "utf-16-le"
-    return "utf-8"
 
 
 def _header(line: str, known: Callable[[Sequence[str]], int]) -> tuple[tuple[str, ...], str]:

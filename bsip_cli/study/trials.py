@@ -83,8 +83,9 @@ def trial_named(
             expected="a task, as walking or walking_run-2",
             remedy="rename it: letters and numbers alone, with _run- and a number behind",
         )
-    run = int(match["run"]) if match["run"] else None
-    return Trial(participant, match["task"], stem, path, _role(match["task"], roles), run)
+    task, run = match["task"], int(match["run"]) if match["run"] else None
+    named: dict[str, Role] = {t: r for r in ("sequence", "static") for t in roles[r]}  # type: ignore[misc]
+    return Trial(participant, task, stem, path, named.get(task, "validation"), run)
 
 
 def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:
@@ -159,13 +160,9 @@ class Folder:
         if fault:
             self.faults.append(fault)
             return
-        match = _TRIAL.fullmatch(path.stem)
-        assert match is not None
-        run = int(match["run"]) if match["run"] else None
-        role = _role(match["task"], self.roles)
-        self.trials.append(
-            Trial(self.participant, match["task"], path.stem, path, role, run, session, forces)
-        )
+        name = path.stem.split("_task-")[1]
+        known = trial_named(self.participant, name, path, self.roles)
+        self.trials.append(replace(known, stem=path.stem, session=session, forces=forces))
 
     def _fault_of_name(self, path: Path, session: str | None) -> Fault | None:
         """What is wrong with a recording's name in the folder of a session, or in none's."""
@@ -244,18 +241,16 @@ def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, .
         )
         found.trials.clear()
     if not found.trials:
-        found.refusals.append(_nothing_in(found))
+        are_unusable = bool(found.refusals)
+        found.refusals.append(
+            BadDataError(
+                "none of its recordings can be used" if are_unusable else "no recordings",
+                file=folder,
+                expected=f"recordings with {_names_like(participant)}",
+                remedy="correct what is said of each" if are_unusable else "add them",
+            )
+        )
     return found
-
-
-def _nothing_in(folder: Folder) -> BadDataError:
-    are_unusable = bool(folder.refusals)
-    return BadDataError(
-        "none of its recordings can be used" if are_unusable else "no recordings",
-        file=folder.path,
-        expected=f"recordings with {_names_like(folder.participant)}",
-        remedy="correct what is said of each" if are_unusable else "add them",
-    )
 
 
 def _names_like(place: str) -> str:
@@ -264,13 +259,6 @@ def _names_like(place: str) -> str:
 
 def _place(participant: str, session: str | None) -> str:
     return f"{participant}_ses-{session}" if session else participant
-
-
-def _role(task: str, roles: Mapping[str, tuple[str, ...]]) -> Role:
-    for role in ("static", "sequence"):
-        if task in roles[role]:
-            return role  # type: ignore[return-value]
-    return "validation"
 
 
 def _fault_of_file(path: Path) -> Fault | None:

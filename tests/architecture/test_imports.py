@@ -26,8 +26,8 @@ ALLOWED = {
     "__main__": "cli",
     "library": "__init__ artifacts body config errors pipeline recordings running schemas stages "
     "study",
-    "commands": "__init__ artifacts body config diagnosis effects errors files instruments "
-    "pipeline recordings report running schemas segments stages statistics study",
+    "commands": "__init__ artifacts body config diagnosis effects errors files identification "
+    "instruments pipeline recordings report running schemas segments stages statistics study",
     "reference": "cli config effects pipeline report schemas",
     "cli": "__init__ commands errors files pipeline running simulate study",
     "body": "config errors files segments stated",
@@ -59,8 +59,8 @@ ONLY = {
     "commands": {
         "stages": {
             "stages.frames",
+            "stages.identification_problem",
             "stages.joints",
-            "stages.load_comparison",
             "stages.survey",
             "stages.trial_scene",
         }

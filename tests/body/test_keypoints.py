@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.body.joint_centres import joint_centres, missing_landmarks
-from bsip_cli.body.keypoints import with_skin
+from bsip_cli.body.joint_centres import joint_centres, missing_landmarks, with_skin
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.motion.calibration import calibrate
 from bsip_cli.recordings.marker_guess import guess_marker_set

@@ -1,9 +1,8 @@
 import pytest
 
-from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.markersets import load_marker_set, shipped_names
 from bsip_cli.errors import UsageError
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import LANDMARKS, SEGMENTS
 from tests.body.standing_person import standing_markers
 
 SHIPPED = (

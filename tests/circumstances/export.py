@@ -22,6 +22,8 @@ class Export:
     channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it; exchanged by
         plate: whether the level forces, and the level moments, stand in each other's place;
         sensors_exchanged by plate of type 3: which two of eight.
+    plate_gains by plate : of all six. late_s : of the forces. of_another : forces of the session's
+        next trial. tared : each trial's plates read zero as it begins.
     plate_order : which plate's readings stand where; corner_roll, corner_wound, doubled,
         summed : see c3d_export. reference : of the moments: sensor (C3D), surface; in MOT point,
         plate_centre, lab_origin.
@@ -43,6 +45,10 @@ class Export:
     plate_signs: dict[int, np.ndarray] = field(default_factory=dict)
     exchanged: dict[int, tuple[bool, bool]] = field(default_factory=dict)
     sensors_exchanged: dict[int, tuple[int, int]] = field(default_factory=dict)
+    plate_gains: dict[int, float] = field(default_factory=dict)
+    late_s: float = 0.0
+    of_another: bool = False
+    tared: bool = False
     plate_order: list[int] | None = None
     corner_roll: dict[int, int] = field(default_factory=dict)
     corner_wound: bool = False
@@ -74,6 +80,7 @@ class Export:
     mot_points: bool = True
     mot_moments: bool = True
     mot_point_unit: str = "m"
+    mot_force_N: float = 1.0  # the unit of force
     mot_unloaded: str = "zero"  # nan
     # participants.tsv
     sex: dict[str, str] = field(default_factory=lambda: {"M": "M", "F": "F"})
@@ -89,6 +96,7 @@ class Export:
     def channels(self, number: int, six: np.ndarray, level: Sequence[int]) -> np.ndarray:
         """(n, 6) of a plate as they are written, whose forces' axes ``level`` lie in the floor."""
         six = six * self.channel_signs * self.plate_signs.get(number, np.ones(6))
+        six *= self.plate_gains.get(number, 1.0)
         for first, is_exchanged in zip((0, 3), self.exchanged.get(number, ()), strict=False):
             if is_exchanged:
                 one, other = (first + k for k in level)

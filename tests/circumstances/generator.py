@@ -142,8 +142,10 @@ def _write_recordings(circumstance: Circumstance, folder: Path) -> None:
     folder.mkdir()
     export, truth = circumstance.export, circumstance.truth
     centres = np.array([plate.corners_m.mean(axis=0) for plate in truth.plates])
-    for k, trial in enumerate(truth.trials):
-        stem, seed = f"{folder.name}_{trial.name}", circumstance.gap_seed(k)
+    for k, true in enumerate(truth.trials):
+        stem, seed = f"{folder.name}_{true.name}", circumstance.gap_seed(k)
+        read = truth.trials[(k + export.of_another) % len(truth.trials)]
+        trial = true.with_forces(read, export.late_s, export.tared)
         if export.format == "c3d":
             write_c3d(folder / f"{stem}.c3d", truth, trial, export, seed)
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tests.circumstances.comparison import Comparison, compare
 from tests.circumstances.generator import Circumstance
@@ -23,11 +23,14 @@ _PLATES = (
     r"frame.*(plate|force)|(plate|force)s?\b.*\bframe\b|another frame|"
     r"plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined|that of plate)"
 )
+# What is told first of forces of a wrong size.
+_SIZE = r"stated mass and the plates do not agree"
 _MOMENT = rf"centre of pressure|moments? (of|in|about|are|with)\b|torque|ORIGIN|corners?|{_PLATES}"
 # Words that name a matter, as narrow as leaves the wording free: a sentence on something else has
 # none of them.
 NAMES = {
-    "rate": r"\d ?Hz\b|\brates?\b|time.?stamps?|\btimes\b|clock|\bin ms\b|frame numbers?",
+    "rate": r"\d ?Hz\b|\b(late|early|delay)\b|\brates?\b|time.?stamps?|\btimes\b|clock|"
+    r"\bin ms\b|frame numbers?",
     "labels": r"labels?\b|marker.?set|no marker|markers? .*(missing|twice|double)|unknown marker",
     "scale": r"POINT:UNITS|units? of (the )?(points|lengths?|markers)|unit.points|lengths? in|"
     r"statur|\btall\b|\bheight\b|inch",
@@ -36,9 +39,9 @@ NAMES = {
     "markers": r"(marker|point|traject)\w*\b.*(missing|invalid|held|slip|jump|repeat|frozen|gap)|"
     r"(missing|invalid|held|repeated|frozen|gaps?)\b.*(marker|point|traject)|residual",
     "force": r"\bsigns?\b|vertical force|forces?\b.*(unit|axes|reverse|do not follow)|mirror|"
-    rf"never loaded|do not carry|{_PLATES}",
+    rf"never loaded|do not carry|{_PLATES}|{_SIZE}",
     "samples": r"\bsamples?\b",
-    "cop": rf"{_MOMENT}|points? of (pressure|force)|for the point|no points?|mirror",
+    "cop": rf"{_MOMENT}|{_SIZE}|points? of (pressure|force)|for the point|no points?|mirror",
     "moment": rf"{_MOMENT}|\bsigns?\b|mirror|none for the moment",
     "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
     "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
@@ -56,6 +59,7 @@ OF_KIND = {
     "plates": ("force", "cop"),
     "plate type": ("moment",),
     "samples": ("samples",),
+    "wrong forces": ("force", "rate", "samples", "mass"),
     "time": ("rate",),
     "labels": ("labels",),
     "missing": ("markers",),
@@ -104,9 +108,11 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     short = {n for n in trials if n not in comparisons or not comparisons[n].is_whole}
     is_whole = not short
     # What must be named: what is wrong in the artifacts, and what these cannot show.
-    # A stated mass shows beside forces only.
+    # A stated mass, and the pace of the frames, show beside forces only.
     has_forces = any(comparison.has_forces for comparison in comparisons.values())
     hidden_matters = [t.name for t in circumstance.things if t.name]
+    if not has_forces and circumstance.export.stated_rate != 1.0:
+        wrong = {which: found for which, found in wrong.items() if which[1] != "rate"}
     asked = [*wrong, *(("", name) for name in hidden_matters if name != "mass" or has_forces)]
     telling = [w for w in news if not _CONTACT.search(w.text)]
     named = {which: word for which in asked if (word := _naming(*which, telling))}
@@ -142,6 +148,16 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     )
 
 
+def judge_by_conclusion(judgement: Judgement, conclusion: str) -> Judgement:
+    """What is wrong without a word when it is read may be found when the forces are explained."""
+    unnamed = [which for which in judgement.wrong if which not in judgement.named]
+    found = [re.search(NAMES[which.split()[-1]], conclusion, re.I) for which in unnamed]
+    if not ("Large error" in conclusion or (found and all(found))):
+        return judgement
+    named = judgement.named | dict.fromkeys(unnamed, conclusion)
+    return replace(judgement, outcome=SAID, named=named, said=(*judgement.said, conclusion))
+
+
 def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparison]:
     truth = circumstance.truth
     found = {}
@@ -169,7 +185,9 @@ def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool)
     left = {
         w for w in wrong if not _naming(*w, [x for x in telling if _IS_LEFT_OUT.search(x.text)])
     }
-    if any(_naming(*w, of_labels if w[1] == "labels" else corrected) for w in left):
+    warned = [w for w in telling if w.level == "warning"]
+    repaired = {w for w in left if _naming(*w, of_labels if w[1] == "labels" else corrected)}
+    if any(not _naming(*w, warned) for w in repaired):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG

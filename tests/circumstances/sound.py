@@ -73,6 +73,16 @@ class Trial:
             moment_Nm=_linear(self.analog_s, self.moment_Nm, analog),
         )
 
+    def with_forces(self, other: Trial, late_s: float, tared: bool) -> Trial:
+        """Plates read what they read in another trial, or later, or from zero on as it begins."""
+        analog = other.analog_s
+        force = _linear(analog + late_s, other.force_N, analog)
+        moment = _linear(analog + late_s, other.moment_Nm, analog)
+        if tared:
+            first = analog < 0.1
+            force, moment = force - force[first].mean(axis=0), moment - moment[first].mean(axis=0)
+        return replace(self, analog_s=analog, force_N=force, moment_Nm=moment)
+
     def seen_from(self, rotation: np.ndarray, shift_m: np.ndarray) -> Trial:
         """In another frame: new = rotation @ old + shift; mirrored where det is -1."""
         force = self.force_N @ rotation.T

@@ -1,4 +1,4 @@
-"""Run `bsip ingest` on a study and read what it made of it: artifacts and printed words only."""
+"""Run bsip on a study and read what it made of it: artifacts and printed words only."""
 
 from __future__ import annotations
 
@@ -50,16 +50,32 @@ class Taken:
 
 def ingest(study: Path, out: Path) -> dict[str, Taken]:
     """`bsip ingest study --out out`, in this process; by participant."""
-    printed = StringIO()
-    with redirect_stderr(printed), redirect_stdout(StringIO()):
+    code, _, printed = _called("ingest", str(study), "--out", str(out))
+    lines = printed.splitlines()
+    people = sorted(folder.name for folder in study.glob("sub-*"))
+    return {name: _read(out / name, name, code, lines, people) for name in people}
+
+
+def concluded(study: Path, out: Path) -> str:
+    """Of a study of one person, what `bsip run` refuses or `bsip show` finds: nothing if it finds
+    neither a cause nor a large error."""
+    code, _, printed = _called("run", str(study), "--out", str(out))
+    if code:
+        return " ".join(printed.split())
+    found = " ".join(_called("show", str(out))[1].split("\n  - ")[0].split())
+    return found if re.search(r"\b1\. |Large error", found) else ""
+
+
+def _called(*arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command, in this process."""
+    shown, printed = StringIO(), StringIO()
+    with redirect_stderr(printed), redirect_stdout(shown):
         try:
-            code = cli(["ingest", str(study), "--out", str(out)], standalone_mode=False)
+            code = cli(arguments, standalone_mode=False)
         except BsipError as error:  # as the command's entry point does
             print(f"bsip: {error}", file=printed)
             code = error.exit_code
-    lines = printed.getvalue().splitlines()
-    people = sorted(folder.name for folder in study.glob("sub-*"))
-    return {name: _read(out / name, name, int(code or 0), lines, people) for name in people}
+    return int(code or 0), shown.getvalue(), printed.getvalue()
 
 
 def _read(

@@ -16,6 +16,7 @@ from tests.circumstances.judge import (
     WRONG,
     WRONGLY_REPAIRED,
     judge,
+    judge_by_conclusion,
 )
 from tests.circumstances.taken import Taken, TakenTrial, Word
 
@@ -138,10 +139,14 @@ def test_each_wrong_number_is_seen(circumstance, change, quantity):
     assert quantity in compared(circumstance, change).wrong
 
 
-def outcome_of(circumstance, change, *words, exit_code=0):
+def judged(circumstance, change, *words, exit_code=0):
     labels = circumstance.truth.labels
     trials = {t.name: change(exact(t, labels)) for t in circumstance.truth.trials}
-    return judge(circumstance, Taken(exit_code, trials, words)).outcome
+    return judge(circumstance, Taken(exit_code, trials, words))
+
+
+def outcome_of(circumstance, change, *words):
+    return judged(circumstance, change, *words).outcome
 
 
 def word(level, text, trial=""):
@@ -172,6 +177,8 @@ UNIT = "ANALOG:UNITS says N mm; read the moments in N m"
         (beside, [word("warning", "force plates were switched on")], WRONG),
         (beside, [word("warning", "plate 1: its frame may be wrong")], SAID),
         (beside, [word("corrected", UNIT)], WRONGLY_REPAIRED),
+        (beside, [word("corrected", UNIT), word("printed", UNIT)], WRONGLY_REPAIRED),
+        (beside, [word("corrected", UNIT), word("warning", "moments of plate 1 doubted")], SAID),
         (nothing_valid, [word("excluded", UNIT)], REFUSED),
         (mostly_lost, [], MISNAMED),
         (nothing_valid, [word("excluded", "the left hand holds something")], MISNAMED),
@@ -201,3 +208,18 @@ def test_the_truth_at_a_frame_is_not_late(circumstance, per_frame):
     rising = np.broadcast_to(trial.analog_s[:, None, None], trial.force_N.shape)
     found = truth_wrenches(replace(trial, force_N=rising))[1:-1, 0, 0]
     np.testing.assert_allclose(found, trial.time_s[1:-1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("conclusion", "outcome"),
+    [
+        ("Large error, cause unknown.", SAID),
+        ("1. Plate 1 reads the moment about the vertical with a constant offset.", SAID),
+        ("1. The left hand holds 1 kg.", WRONG),
+        ("", WRONG),
+    ],
+)
+def test_what_is_silent_when_read_may_be_said_in_the_end(circumstance, conclusion, outcome):
+    silent = judged(circumstance, twisted)
+    assert silent.outcome == WRONG
+    assert judge_by_conclusion(silent, conclusion).outcome == outcome

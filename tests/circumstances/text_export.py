@@ -19,7 +19,7 @@ def write_trc(path: Path, session: Session, trial: Trial, export: Export, seed: 
     points, _ = stored_points(trial.markers_m @ export.axes.T, export, seed)
     frames, markers, _ = points.shape
     labels = [export.label(name) for name in session.labels]
-    rate = f"{export.marker_hz:g}"
+    rate = f"{export.marker_hz * export.stated_rate:g}"
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame"
@@ -44,7 +44,7 @@ def write_trc(path: Path, session: Session, trial: Trial, export: Export, seed: 
     for k, (time, row) in enumerate(zip(trial.time_s, points.reshape(frames, -1), strict=True)):
         cells = ["" if np.isnan(x) else f"{x:.5f}" for x in row]
         more = unnamed if k % 3 == 0 else []
-        stamp = _stamp(time + export.trc_start_s, k, export)
+        stamp = _stamp(time / export.stated_rate + export.trc_start_s, k, export)
         lines.append("\t".join([str(k + 1), stamp, *cells, *more]))
     path.write_text("\n".join(lines) + "\n")
 
@@ -117,6 +117,7 @@ def _columns_of(
     gap = np.nan if export.mot_unloaded == "nan" else 0.0
     force = np.where(loaded[:, None], force, 0.0)
     point, about = (np.where(loaded[:, None], x, gap) for x in (point, about))
+    force, about = force / export.mot_force_N, about / export.mot_force_N
     return force, point / SIZES[export.mot_point_unit], about / MOMENT_SIZES[export.moment_unit]
 
 

@@ -361,6 +361,22 @@ def lost_samples(export: Export, rng: np.random.Generator, plates: int) -> str:
     return _damaged(export, rng, plates, hit, f"all zero {count} times for {length_s:.3f} s")
 
 
+def tared(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.tared = True
+    return "plates zeroed as each trial begins, whoever stands on them"
+
+
+def one_plate_gain(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate, gain = _one_of(rng, plates), pick(rng, (0.5, 0.8, 1.25, 2.0))
+    export.plate_gains, export.stated_mass = {plate: gain}, True
+    return f"plate {plate + 1} reads {gain:g} times the load; the mass is stated"
+
+
+def force_unit(export: Export, rng: np.random.Generator, plates: int) -> str:
+    unit, export.mot_force_N = pick(rng, (("kN", 1000.0), ("lbf", 4.448222), ("kgf", 9.80665)))
+    return f"forces and moments in {unit} for N"
+
+
 def _damaged(export: Export, rng: np.random.Generator, plates: int, hit: Damage, words: str) -> str:
     export.damage, export.damaged_plate = hit, _one_of(rng, plates)
     return f"plate {export.damaged_plate + 1}: {words}"
@@ -381,8 +397,18 @@ def rates(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.stated_rate = pick(rng, (0.5, 2.0))
+    export.stated_rate = pick(rng, (0.5, 0.8, 1.2, 2.0))
     return f"the file states {export.stated_rate:g} times the cameras' rate"
+
+
+def forces_late(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.late_s = float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(0.05), np.log(1.0))))
+    return f"forces {export.late_s:.2f} s late"
+
+
+def forces_of_another(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.of_another = True
+    return "the force tables of the two trials exchanged"
 
 
 def few_decimals(export: Export, rng: np.random.Generator, plates: int) -> str:
@@ -517,6 +543,8 @@ def table_format(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 C3D, TEXT = ("c3d",), ("trc",)
+NO_EXPORT = "wrong forces"
+"""What no other understanding of the numbers puts right: it is to be refused or said."""
 THINGS = (
     Thing("length unit", "length", points_unit_stated),
     Thing("length unit", "length", points_unit_wrong),
@@ -563,8 +591,13 @@ THINGS = (
     Thing("samples", "samples", spikes, C3D),
     Thing("samples", "samples", cut_off, C3D),
     Thing("samples", "samples", lost_samples, C3D),
+    Thing(NO_EXPORT, "samples", tared),
+    Thing(NO_EXPORT, "gain", one_plate_gain),
+    Thing(NO_EXPORT, "force_unit", force_unit, TEXT),
     Thing("time", "time", rates),
-    Thing("time", "time", other_rate_stated, C3D),
+    Thing("time", "time", other_rate_stated),
+    Thing("time", "time", forces_late),
+    Thing(NO_EXPORT, "time", forces_of_another, TEXT),
     Thing("time", "time", few_decimals, TEXT),
     Thing("time", "time", milliseconds, TEXT),
     Thing("time", "time", frame_numbers, TEXT),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from bsip_cli.commands.init import Request, init_command
+from bsip_cli.commands.init import init_command
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.force_files import ENDINGS
@@ -39,7 +39,7 @@ def lab(tmp_path) -> Path:
 def made(lab: Path, **options) -> tuple[int, Path]:
     out = lab.parent / "study"
     asked = {"given": (lab,), "out": out, "participant": "", "link": False}
-    return init_command(Request(**(asked | options))), out
+    return init_command(**(asked | options)), out
 
 
 def rows(out: Path, name: str) -> list[list[str]]:

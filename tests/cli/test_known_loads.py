@@ -17,9 +17,8 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.people import Inertia, combined
-from bsip_cli.simulate.recording import measure_trial, write_trial
+from bsip_cli.simulate.recording import measure_trial, simulate_trial, write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
-from bsip_cli.simulate.trial import simulate_trial
 from bsip_cli.study.study import load_study
 
 GOOD = '[[loads]]\nsegment = "shank_r"\nmass_kg = 1.0\nposition_m = [0.0, -0.15, 0.03]\n'

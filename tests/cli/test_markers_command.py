@@ -11,7 +11,7 @@ import pytest
 
 from bsip_cli.artifacts import read_header
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.commands.markers import Request, markers_command
+from bsip_cli.commands.markers import markers_command
 from bsip_cli.errors import BadDataError, UsageError
 from tests.recordings.recording_writers import standing_markers, write_trc
 
@@ -56,12 +56,14 @@ def recording(folder: Path, labels: Sequence[str], empty: Sequence[str] = ()) ->
     return path
 
 
-def asked(path: Path, **options) -> Request:
-    return Request(**{"file": path, "marker_set": "auto", "prefix": "", "write": None} | options)
+def told(path: Path, **options) -> int:
+    """The exit code of the command."""
+    asked = {"file": path, "marker_set": "auto", "prefix": "", "write": None} | options
+    return markers_command(**asked)
 
 
 def test_a_known_set_is_complete(here, capsys):
-    assert markers_command(asked(recording(here, HANSEN))) == 0
+    assert told(recording(here, HANSEN)) == 0
     said = capsys.readouterr().out
     assert "marker set: hansen2017 (Hansen 2017, full body), guessed: 38 of its 38 markers" in said
     assert "  RTEM   seen 100.0 %  head, right temple\n" in said
@@ -72,7 +74,7 @@ def test_a_known_set_is_complete(here, capsys):
 def test_what_is_missing_on_which_segment(here, capsys):
     gone = {"RTEM", "LTEM", "FHEAD", "LWRU", "RMALL"}
     path = recording(here, [label for label in HANSEN if label not in gone], empty=["C7"])
-    assert markers_command(asked(path)) == 3
+    assert told(path) == 3
     said = capsys.readouterr().out
     assert "  head              0 markers; missing: RTEM, LTEM, FHEAD; its joint is held" in said
     assert "  left hand         2 markers; missing: LWRU\n" in said
@@ -83,7 +85,7 @@ def test_what_is_missing_on_which_segment(here, capsys):
 def test_no_trunk_is_refused_as_scale_does(here, capsys):
     on_legs = ("lower_torso", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
     legs = [m.label for m in load_marker_set("hansen2017").markers if m.segment in on_legs]
-    assert markers_command(asked(recording(here, legs))) == 3
+    assert told(recording(here, legs)) == 3
     said = capsys.readouterr().out
     assert "refused, unless scale.may_be_held in study.toml names it" in said
     assert "cannot be built" not in said
@@ -91,7 +93,7 @@ def test_no_trunk_is_refused_as_scale_does(here, capsys):
 
 def test_an_unknown_set_is_written_down_and_serves(here, capsys):
     path = recording(here, [f"P:{label}" for label in OWN])
-    assert markers_command(asked(path)) == 0
+    assert told(path) == 0
     said = capsys.readouterr().out
     assert "none of the shipped sets fits; of 20 labels the words tell 19" in said
     assert "  P:LWrist     seen 100.0 %  left forearm, left wrist\n" in said
@@ -101,12 +103,12 @@ def test_an_unknown_set_is_written_down_and_serves(here, capsys):
     landmarks = {m.label: m.landmark for m in load_marker_set(str(starter)).markers}
     assert landmarks["RKneeLat"] == "knee_lateral_r" and landmarks["IJ"] == "suprasternale"
     assert len(landmarks) == len(OWN) - 1
-    assert markers_command(asked(path, marker_set=str(starter))) == 0
+    assert told(path, marker_set=str(starter)) == 0
     assert "marker set: a_trial_markers" in capsys.readouterr().out
 
 
 def test_labels_without_sense_give_a_template(here):
-    assert markers_command(asked(recording(here, ["0001", 'a "b" \\', "0003"]))) == 3
+    assert told(recording(here, ["0001", 'a "b" \\', "0003"])) == 3
     starter = here / "a_trial_markers.toml"
     with pytest.raises(UsageError, match="expected lines like head"):
         load_marker_set(str(starter))
@@ -120,18 +122,18 @@ def test_labels_without_sense_give_a_template(here):
 def test_nothing_is_written_over(here, capsys):
     path, mine = recording(here, OWN), here / "a_trial_markers.toml"
     mine.write_text("mine", encoding="utf-8")
-    assert markers_command(asked(path)) == 0
+    assert told(path) == 0
     assert "is there already" in capsys.readouterr().out
     with pytest.raises(UsageError, match="not written over"):
-        markers_command(asked(path, write=mine))
+        told(path, write=mine)
     assert mine.read_text(encoding="utf-8") == "mine"
     with pytest.raises(UsageError, match="cannot be written"):
-        markers_command(asked(path, write=here / "no" / "folder.toml"))
+        told(path, write=here / "no" / "folder.toml")
 
 
 def test_a_first_set_on_request_also_of_a_known_one(here):
     target = here / "mine.toml"
-    assert markers_command(asked(recording(here, HANSEN), write=target)) == 0
+    assert told(recording(here, HANSEN), write=target) == 0
     mine = {m.label: (m.segment, m.landmark) for m in load_marker_set(str(target)).markers}
     assert mine == {m.label: (m.segment, m.landmark) for m in load_marker_set("hansen2017").markers}
 
@@ -139,8 +141,8 @@ def test_a_first_set_on_request_also_of_a_known_one(here):
 def test_two_people(here, capsys):
     path = recording(here, [f"{name}:{label}" for name in ("Anna", "Ben") for label in HANSEN])
     with pytest.raises(BadDataError, match=r"2 people in one file: 'Anna:' .38 markers., 'Ben:'"):
-        markers_command(asked(path))
-    assert markers_command(asked(path, prefix="Ben")) == 0
+        told(path)
+    assert told(path, prefix="Ben") == 0
     said = capsys.readouterr().out
     assert "labels of the person with the prefix 'Ben:'" in said
     assert "  Ben:C7      seen 100.0 %  upper torso, c7\n" in said
@@ -149,14 +151,14 @@ def test_two_people(here, capsys):
 
 def test_what_is_missing_is_said_of_a_set_of_words(here, capsys):
     path = recording(here, [label for label in OWN if "Heel" not in label])
-    assert markers_command(asked(path)) == 3
+    assert told(path) == 3
     assert "a skeleton cannot be built without: calcaneus_l, calcaneus_r" in capsys.readouterr().out
 
 
 def test_the_starter_of_a_near_miss_holds_both(here):
     labels = [label for label in HANSEN if label not in ("RMT2", "LMT2")]
     path = recording(here, [*labels, "RToe", "LToe", "what"])
-    assert markers_command(asked(path)) == 0
+    assert told(path) == 0
     starter = here / "a_trial_markers.toml"
     landmarks = {m.label: m.landmark for m in load_marker_set(str(starter)).markers}
     assert landmarks["RToe"] == "metatarsal_2_r" and landmarks["RKNEL"] == "knee_lateral_r"

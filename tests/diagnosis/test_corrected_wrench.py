@@ -9,8 +9,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.diagnosis.cause import Cause, change_by
-from bsip_cli.diagnosis.corrected_wrench import (
+from bsip_cli.diagnosis.cause import (
+    Cause,
+    change_by,
     corrected_plates,
     corrected_wrench,
     is_of_the_forces,

@@ -9,11 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.evenness import plain, unevenness
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
-from bsip_cli.diagnosis.held_out import held_out
+from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -100,7 +99,7 @@ def test_what_looks_alike_is_a_group_that_holds_the_truth():
     assert {one.verdict for one in findings} == {"ambiguous"}
     assert (findings[0].effect, findings[0].target) == ("added_mass", "forearm_r")
     assert sum(one.probability for one in findings) >= NAMED_FROM
-    assert all("to tell them apart" in one.sentence for one in findings)
+    assert all("to distinguish them" in one.sentence for one in findings)
 
 
 def half_late(seed: int) -> Scene:

@@ -103,7 +103,7 @@ def test_a_bend_of_the_trunk_and_soft_tissue_are_not_told_apart():
     first = bend.numbers[0]
     assert first.name == "flexion" and first.low < true[0][2] < first.high
     assert "of all markers' squared residual" in bend.sentence
-    assert "to tell them apart" in bend.sentence and "to tell them apart" in tissue.sentence
+    assert "to distinguish them" in bend.sentence and "to distinguish them" in tissue.sentence
 
 
 @pytest.mark.parametrize("joint", ["knee_l", "waist"])

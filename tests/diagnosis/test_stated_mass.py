@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.stated_mass import (
+from bsip_cli.diagnosis.support import (
     CLASS,
     agreed_share,
     loaded_plate,
@@ -27,7 +27,7 @@ def test_plates_that_read_otherwise_make_a_class(share):
     scene = standing_still()
     scene = replace(scene, wrench=(1 + share) * scene.predicted)
     found = stated_mass_findings(
-        weight_share(scene), scene.mass_kg, MASS_SD, None, ("standing",), "in quiet standing"
+        weight_share(scene), scene.mass_kg, MASS_SD, None, ("standing",), "in quiet stance"
     )
     sizes = {one.effect: one.numbers[0].value for one in found}
     assert abs(sizes["plate_gain"] - share) < 1e-9
@@ -45,7 +45,7 @@ def test_plates_that_agree_say_nothing():
     scene = standing_still()
     scene = replace(scene, wrench=1.01 * scene.predicted)
     share = weight_share(scene)
-    said = (None, ("standing",), "in quiet standing")
+    said = (None, ("standing",), "in quiet stance")
     assert stated_mass_findings(share, scene.mass_kg, MASS_SD, *said) == ()
 
 
@@ -84,7 +84,7 @@ def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
 def test_a_scale_that_errs_more_says_less():
     scene = standing_still()
     share = weight_share(replace(scene, wrench=1.03 * scene.predicted))
-    said = (None, ("standing",), "in quiet standing")
+    said = (None, ("standing",), "in quiet stance")
     good = stated_mass_findings(share, scene.mass_kg, MASS_SD, *said)
     assert stated_mass_findings(share, scene.mass_kg, 2 * MASS_SD, *said) == ()
     assert good[0].numbers[0].high < share * MASS_KG + 2 * MASS_SD * MASS_KG

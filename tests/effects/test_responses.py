@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.effects.markers import during, step
+from bsip_cli.effects.scene import without_fast
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.jacobian import marker_residuals, marker_trust, pose_responses
 from tests.body.standing_person import away, markers_of, standing
@@ -94,3 +95,36 @@ def test_a_frame_without_markers_stays_where_it_is():
     moved = pose_responses(PERSON, q, trust).of(np.full((*trust.shape, 3, 1), 0.01))
     assert np.abs(moved[2]).max() == 0.0
     assert np.abs(moved[1]).max() > 0.005
+
+
+# --- a trial at a lower rate shows what is slow as it is, and nothing of what is fast -------------
+
+
+def swinging(frequency_hz: float) -> np.ndarray:
+    times = moving().times_s
+    return np.sin(2 * np.pi * frequency_hz * times)[:, None] * np.ones(6)
+
+
+def test_what_is_slow_stays():
+    slow = swinging(6.0)
+    np.testing.assert_allclose(without_fast(slow, 2)[20:-20], slow[20:-20], atol=0.002)
+
+
+def test_noise_does_not_turn_up_among_the_slow_changes():
+    """Every second of 100 frames per second would show 44 Hz as 6 Hz."""
+    fast = swinging(44.0)
+    assert np.abs(without_fast(fast, 2)[20:-20]).max() < 0.002
+
+
+def test_where_nothing_was_measured_nothing_is_made_up():
+    wrench = swinging(6.0)
+    wrench[100:120] = np.nan
+    np.testing.assert_array_equal(np.isnan(without_fast(wrench, 2)), np.isnan(wrench))
+
+
+def test_plates_and_their_sum_lose_the_same_frames():
+    scene = moving()
+    whole = scene_of(scene.q, scene.v, scene.a, wrench=scene.predicted).every(2)
+    assert len(whole.times_s) == len(scene.times_s[::2])
+    total = sum(plate.wrench for plate in whole.plates)
+    np.testing.assert_allclose(whole.measured, total, atol=1e-6)

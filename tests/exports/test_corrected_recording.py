@@ -229,8 +229,8 @@ def test_a_recording_that_nobody_looked_at_has_what_its_session_shares(
     facts = {"causes": [cause | {"values": [0.06], "folds": [[0.06]]}], "trials": [*looked_at]}
     unit = SimpleNamespace(
         name="C",
-        trial=trials[2],
-        participant=SimpleNamespace(id="sub-01", trials=trials),
+        own_trial=trials[2],
+        person=SimpleNamespace(id="sub-01", trials=trials),
         facts=lambda kind: facts,
         has=lambda kind: False,
     )

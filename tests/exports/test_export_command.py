@@ -15,7 +15,7 @@ import pytest
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
-from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson, plain_names, xml_comment
 from bsip_cli.cli import cli
 from bsip_cli.errors import BadDataError

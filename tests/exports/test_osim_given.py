@@ -9,14 +9,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.exports.body_map import (
+from bsip_cli.body.exports.identified import neutral_pose
+from bsip_cli.body.exports.osim_given import (
+    check_fits,
     check_segments,
     fitting_map,
     load_body_map,
+    read_given_model,
     shipped_names,
+    with_inertias,
 )
-from bsip_cli.body.exports.identified import neutral_pose
-from bsip_cli.body.exports.osim_given import check_fits, read_given_model, with_inertias
 from bsip_cli.errors import UsageError
 from tests.exports.exported_person import our_model, whole_body
 

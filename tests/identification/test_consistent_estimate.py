@@ -6,9 +6,15 @@ from scipy import stats
 
 from bsip_cli.body.inertia import from_phi, from_readable
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
-from bsip_cli.identification.consistent import Weights, estimate, fit_at, fit_with_weights, terms_of
+from bsip_cli.identification.consistent import (
+    Weights,
+    are_physical,
+    estimate,
+    fit_at,
+    fit_with_weights,
+    terms_of,
+)
 from bsip_cli.identification.prior import likeliest
-from bsip_cli.identification.pseudo_inertia import are_physical
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import motion, problem_of, regressor, world
 

@@ -23,7 +23,7 @@ def chosen(contacts: tuple[str, ...], **frames: int) -> tuple[list[str], list[st
     said: list[str] = []
     unit = SimpleNamespace(
         name="sub-01",
-        warn=said.append,
+        say=lambda text: said.append(f"sub-01: {text}"),
         trials=lambda *kinds: trials,
         read=lambda kind, trial: pd.DataFrame(
             {"determined": True, "valid": True}, index=range(frames[trial.task])

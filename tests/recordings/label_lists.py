@@ -6,8 +6,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from bsip_cli.body.landmarks import LANDMARKS
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import LANDMARKS, SEGMENTS
 
 _FILE = Path(__file__).with_name("label_lists.toml")
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.clock import lags
+from bsip_cli.recordings.plate_reading import FrameChange
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import assemble, open_recording
 from bsip_cli.recordings.settle import settle_session
@@ -75,6 +76,14 @@ def test_side_forces_of_the_other_sign_are_no_delay():
     signs = np.array([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
     wrong = [replace(one, measured=one.measured * signs) for one in of_c3d()]
     assert session_of(opened(wrong)).delays_s == {}
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_delay_is_found_in_forces_of_a_mirrored_frame(axis):
+    late = opened(of_c3d()).in_frame(FrameChange("forces", axis)).with_forces_from(-0.6)
+    session = session_of(late)
+    assert list(session.delays_s.values()) == [pytest.approx(0.6, abs=0.03)]
+    assert session.frame == FrameChange("forces", axis)
 
 
 def test_only_the_trial_that_is_late_is_moved():

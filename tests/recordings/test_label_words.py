@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.recordings.label_words import Meaning, meaning_of, meanings
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import LANDMARKS, SEGMENTS
 from tests.recordings.label_lists import LabelList, label_lists
 
 SPELLINGS = {

@@ -9,12 +9,13 @@ import pytest
 
 from bsip_cli.recordings.analog import check_samples, spike_samples
 from bsip_cli.recordings.model import Plate, Recording
+from bsip_cli.recordings.plate_of_c3d import C3dPlate
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
-from bsip_cli.recordings.read import read_recording, sign_doubts
+from bsip_cli.recordings.read import lost_zeros, read_recording, sign_doubts
 from bsip_cli.recordings.zero import nobody_near, plate_zero
 from tests.circumstances.sound import sound_session
+from tests.recordings import standing_on_two_plates as trials
 from tests.recordings.recording_writers import (
     CORNERS_M,
     PlateSpec,
@@ -153,6 +154,17 @@ def test_weight_that_does_not_shift_tells_a_lost_zero():
     (doubt,) = sign_doubts([_plate(713 + sway, "1"), right], ["1"], RATE_HZ)
     assert doubt.level == "warning" and "r = 1.00" in doubt.found
     assert sign_doubts([_plate(713 + sway, "1"), right], [], RATE_HZ) == []
+
+
+def test_a_plate_that_was_zeroed_under_the_person_is_no_reversed_one():
+    """One foot is lifted for a second: what its plate reads then, the other one reads more."""
+    lifted = np.where(np.arange(trials.N) // 100 == 2, 350.0, 0.0)
+    recording = trials.opened([]).recording
+    tared = [_plate(lifted, "1"), _plate(lifted, "2")]  # the first as it is after a reversal
+    assert "set to zero under the person" in lost_zeros(tared, ["1"], recording)
+    assert lost_zeros(tared, [], recording) == ""
+    sound = [_plate(350 - lifted, "1"), _plate(350 + lifted, "2")]
+    assert lost_zeros(sound, ["1"], recording) == ""
 
 
 def test_spikes_and_lost_samples_are_marked():

@@ -10,8 +10,9 @@ import pytest
 
 from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.recordings.plate_of_c3d import C3dPlate
+from bsip_cli.recordings.plate_of_table import ForceOnPoint
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
-from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
@@ -66,17 +67,19 @@ def of_sensors(one: str = "", other: str = "") -> list[C3dPlate]:
     return sources
 
 
-def of_points(exchanged: bool = False) -> list[C3dPlate]:
-    """Of type 1, with the coordinates of the point exchanged."""
+def of_points(
+    exchanged: bool = False, point_scale: float = 1.0, torque_scale: float = 1.0
+) -> list[C3dPlate]:
+    """Of type 1, with the coordinates of the point exchanged, or in other units."""
     sources = []
     for plate in of_c3d(origin_m=(0.0, 0.0, 0.0)):
         force, moment = np.split(plate.measured, 2, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             x, y = (np.nan_to_num(m / force[:, 2]) for m in (-moment[:, 1], moment[:, 0]))
         torque = moment[:, 2] - x * force[:, 1] + y * force[:, 0]
-        point = [y, x] if exchanged else [x, y]
+        point = point_scale * np.array([y, x] if exchanged else [x, y])
         stated = replace(plate.description, kind=1)
-        channels = measured(np.column_stack([force, *point, torque]), 1)
+        channels = measured(np.column_stack([force, *point, torque_scale * torque]), 1)
         sources.append(replace(plate, description=stated, measured=channels))
     return sources
 
@@ -129,6 +132,14 @@ FAULTS = {
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
     "eight sensors, sound": (of_sensors, {}, ""),
     "a point and a torque, sound": (of_points, {}, ""),
+    "a torque in N mm": (of_points, {"torque_scale": 1e3}, "N mm"),
+    "a point in m, taken for mm": (of_points, {"point_scale": 1e-3}, "points of force in m"),
+    "a point in cm, taken for mm": (of_points, {"point_scale": 0.1}, "points of force in cm"),
+    "a point and a torque reversed": (
+        of_points,
+        {"point_scale": -1.0, "torque_scale": -1.0},
+        "reversed the moments",
+    ),
     "Px and Py exchanged": (of_points, {"exchanged": True}, "exchanged Px and Py"),
 } | {
     f"{one} and {other} exchanged": (

@@ -396,7 +396,7 @@ def diagnosis(trials: list[str]) -> pd.DataFrame:
     """A turned plate (named), a group of two in the last trial, and a rejected wobbling mass."""
     everywhere, last = ", ".join(trials), trials[-1]
     turned = "plate 1 is turned by +2.0 degrees (yaw: 95 % interval 1.75 to 2.26°)"
-    alike = "; other causes look alike here: to tell them apart, pray"
+    alike = "; other causes look alike here: to distinguish them, pray"
     return frame(
         "rank effect target parameter estimate unit ci_low ci_high p_value gain_percent "
         "gain_ci_low gain_ci_high verdict class_id sentence trials probability scope rms_change",

@@ -65,7 +65,7 @@ def chosen(trials: dict[str, dict], *, rare=False, contacts=(), identified=True)
     unit = SimpleNamespace(
         name="sub-01",
         read=read,
-        warn=lambda text: None,
+        say=lambda text: None,
         trials=lambda *kinds: tuple(made.values()),
         facts=lambda kind: {"external_contacts": dict.fromkeys(contacts, RAIL)},
         write=lambda kind, frame: written.append(frame),

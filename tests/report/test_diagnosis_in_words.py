@@ -15,7 +15,7 @@ from bsip_cli.report.effect_words import (
     separating_recording,
     size_words,
 )
-from bsip_cli.report.errors import budget_sentences, fault_share, overall_pieces, pieces
+from bsip_cli.report.errors import budget_sentences, found_share, overall_pieces, pieces
 from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
 from bsip_cli.report.verdict import (
     cause_line,
@@ -74,7 +74,7 @@ def test_what_only_the_markers_prove_says_so(found):
 def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
     leaning = found[found["rank"] == 1].assign(trials="sub-01_task-stairs", rank=9)
     text = text_of(pd.concat([found, leaning]), detection(TRIALS))
-    assert "Recordings looked at: basketball (run 1), sequence (run 1) and stairs." in text
+    assert "Recordings analysed: basketball (run 1), sequence (run 1) and stairs." in text
     assert "only in sequence (run 1) and basketball (run 1)" in text
     standing = leaning.assign(class_id="W")
     assert "stairs" not in text_of(pd.concat([found, standing]), detection(TRIALS))[-400:]
@@ -120,7 +120,7 @@ def test_members_of_a_group_may_be_of_different_recordings(found):
 
 def test_what_quiet_standing_tells_gives_its_advice_once(found):
     """The static recording is none of those that were searched."""
-    told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to tell them apart, weigh it"
+    told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to distinguish them, weigh it"
     rows = found[found["class_id"] != ""].assign(
         class_id="W", trials="sub-01_task-static", sentence=told, probability=1 / 3
     )
@@ -170,7 +170,7 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
     assert said.headline.startswith("No fault found. None of the")
-    assert said.paragraphs()[1] == "Recordings looked at: basketball (run 1) and sequence (run 1)."
+    assert said.paragraphs()[1] == "Recordings analysed: basketball (run 1) and sequence (run 1)."
     assert said.paragraphs()[2].endswith("might have gone unseen.")
 
 
@@ -189,7 +189,10 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
         "recordings at most 15.2 N remain."
     )
     both = pd.concat([large, found[found["rank"] > 1]])
-    assert light_of(both, detection(TRIALS)).title == "Large error, cause unknown; 1 fault found"
+    assert (
+        light_of(both, detection(TRIALS)).title
+        == "Large error, cause unknown; besides it 1 fault found"
+    )
 
 
 def test_something_that_cannot_be_named(found):
@@ -270,7 +273,7 @@ def test_what_changes_the_forces_most_comes_first(found):
 def test_soft_tissue_or_a_bend_of_the_trunk(found):
     """As ``marker_proof`` says it: no forces tell, and the markers do not tell which."""
     remedy = EFFECTS["missing_joint"].remedy
-    advice = f"; a second bend and soft tissue look alike here: to tell them apart, {remedy}"
+    advice = f"; a second bend and soft tissue look alike here: to distinguish them, {remedy}"
     bend = "the trunk bends twice (flexion: 95 % interval 0.3 to 0.4); this is 40 % of all"
     group = found[found["class_id"] == "B"].assign(
         effect=["missing_joint", SOFT_TISSUE],
@@ -378,7 +381,7 @@ def test_gains_lead_with_what_improves():
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    looked = "Recordings looked at: basketball (run 1) and sequence (run 1)."
+    looked = "Recordings analysed: basketball (run 1) and sequence (run 1)."
     told = verdict_of(found, detection(TRIALS), gains()).results
     assert told == (gain_sentence(gains()), looked)
     advice, where = verdict_of(found, detection(TRIALS)).results
@@ -400,7 +403,7 @@ def test_changes_of_the_body_lead_with_the_largest():
 
 def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():
     table = error_budget(["sub-01_task-squat_run-1"])
-    found = pieces(table, "", "fz")
+    found = pieces(table, "fz", ())
     assert [one.label for one in found] == [
         "the table's segment parameters",
         "soft tissue or smoothing of the motion",
@@ -408,7 +411,7 @@ def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():
         "noise",
     ]
     assert sum(one.share for one in found) == pytest.approx(100.0)
-    (first, *_) = budget_sentences(table)
+    (first, *_) = budget_sentences(table, ())
     assert first.startswith("What makes RM's error of 20.0 N in force, lab Z (up): the table's")
     assert "change the error by −40 % (−50 to −30 %)" in first
 
@@ -419,10 +422,24 @@ def test_the_one_bar_is_the_mean_over_what_is_asked_first():
     fz = small["component"].eq("fz") & small["term"].eq("unknown")
     small.loc[fz, "share_percent"] = 99.0  # of an error that is of no interest
     for budget in (table, small):
-        found = {one.label: one.share for one in overall_pieces(budget)}
+        found = {one.label: one.share for one in overall_pieces(budget, ())}
         assert sum(found.values()) == pytest.approx(100.0)
         assert found["unknown"] == pytest.approx(20.0)
-    assert overall_pieces(table.assign(rms=0.1)) == ()
-    fault = table.assign(term=table["term"].replace("soft_tissue", "fault:plate_rotation"))
-    assert fault_share(fault) == pytest.approx(25.0)
-    assert fault_share(table) == 0.0
+    assert overall_pieces(table.assign(rms=0.1), ()) == ()
+
+
+@pytest.mark.parametrize("share", [25.0, 1.0])
+def test_what_was_found_has_its_own_piece_and_makes_as_much_as_it_says(share):
+    table = error_budget(["sub-01_task-squat_run-1"])
+    term = table["term"].replace("soft_tissue", "fault:plate_rotation")
+    shares = table["share_percent"].mask(table["term"] == "soft_tissue", share)
+    fault = table.assign(term=term, share_percent=shares, alike="")
+    title, found = EFFECT_WORDS["plate_rotation"].title, {"plate_rotation"}
+    pieces = {one.label: one.share for one in overall_pieces(fault, found)}
+    assert pieces[title] == pytest.approx(share)
+    assert found_share(fault, found) == pytest.approx(share)
+    others = {one.label for one in overall_pieces(fault, ())}
+    assert {label for label in others if title in label} == (
+        {f"perhaps {title}"} if share > 5 else set()
+    )
+    assert found_share(fault, {"sync_offset"}) == found_share(table, found) == 0.0

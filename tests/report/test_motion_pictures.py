@@ -38,6 +38,12 @@ def test_the_figure_shows_markers_force_and_when(pose):
     assert "ground force" not in stick_figure(unmeasured, "squat").get_supxlabel()
 
 
+def test_a_force_too_small_for_a_centre_of_pressure_has_no_arrow(pose):
+    nowhere = replace(pose, force_at_m=np.full(3, np.nan))
+    assert not stick_figure(nowhere, "squat").axes[0].texts
+    assert stick_figure(pose, "squat").axes[0].texts
+
+
 def test_one_body_weight_is_half_as_long_as_the_person_is_tall(pose):
     np.testing.assert_allclose(pose.tip_m() - pose.force_at_m, [0, 0, 0.5 * (1.8 - 0.05)])
     assert pose.is_loaded()

@@ -169,9 +169,12 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, most of it the table's segment parameters (70 %); 1 fault found"
+        "Large error, most of it the table's segment parameters (70 %); besides it 1 fault found"
     )
-    assert light_of(beside, record.detection).title == "Large error, cause unknown; 1 fault found"
+    assert (
+        light_of(beside, record.detection).title
+        == "Large error, cause unknown; besides it 1 fault found"
+    )
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
     unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
@@ -192,7 +195,9 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
     assert (light.state, light.title) == ("large", "Large error also with identified parameters")
-    assert light.text.startswith("Large with OM: vertical force 5.5 % of body weight. None of the")
+    assert light.text.startswith(
+        "Large with OM (identified): vertical force 5.5 % of body weight. None of the"
+    )
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)
 

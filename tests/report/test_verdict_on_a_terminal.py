@@ -5,7 +5,7 @@ from dataclasses import replace
 import pandas as pd
 
 from bsip_cli.commands.show import shown, verdict_text
-from bsip_cli.report.verdict import put_right_sentence, verdict_of
+from bsip_cli.report.verdict import corrected_sentence, verdict_of
 from tests.report.fake_study import Artifacts, detection, diagnosis, marker_events
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
@@ -26,12 +26,12 @@ def test_causes_are_numbered_and_lines_fit():
 
 def test_what_was_put_right_is_told_too():
     events = marker_events().assign(put_right=True, sentence="A and B bear labels; corrected")
-    right = put_right_sentence([(TRIALS[0], events)])
+    right = corrected_sentence([(TRIALS[0], events)])
     assert right == (
         "Corrected already, before the search for faults: in sequence (run 1) A and B bear labels.",
     )
     assert "Corrected already" in text_of(diagnosis(TRIALS), right=right)
-    assert put_right_sentence([(TRIALS[0], marker_events())]) == ()
+    assert corrected_sentence([(TRIALS[0], marker_events())]) == ()
 
 
 def test_a_file_cannot_send_commands_to_the_terminal():
@@ -50,9 +50,9 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     flat = " ".join(text.split())
     assert " 1. Plate 1 is turned by +2.0 degrees" in flat
     assert "Use OM (segment parameters identified" in flat
-    assert "Identification (OM against RM) changes" in flat
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
+    assert "Identification (OM against RM) changes" in " ".join(full.split())
 
 
 def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
@@ -68,7 +68,7 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
     assert said.startswith(
-        "sub-01: Large error also with identified parameters. Large with OM: vertical force"
+        "sub-01: Large error also with identified parameters. Large with OM (identified): vertical"
     )
     page = replace(reports, out=tmp_path).html("sub-01")
     assert "<strong>Large error also with identified parameters</strong>" in page

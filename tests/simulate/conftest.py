@@ -9,7 +9,7 @@ import pytest
 
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Inertia, Person, draw_person, second_moments
-from bsip_cli.simulate.trial import Trial, simulate_trial
+from bsip_cli.simulate.recording import Trial, simulate_trial
 
 DURATION_S = {
     "static": 1.0,

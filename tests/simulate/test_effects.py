@@ -23,9 +23,8 @@ from bsip_cli.simulate.effects.loads import ChestMotion, Swinging
 from bsip_cli.simulate.numerics import about_z, derivative
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.plan import GRAVITY, Poses
-from bsip_cli.simulate.recording import MM, Measurement, measure_trial
+from bsip_cli.simulate.recording import MM, Measurement, Trial, measure_trial, simulate_trial
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.simulate.trial import Trial, simulate_trial
 from tests.blind.outside_effects import OUTSIDE, play
 from tests.simulate.conftest import NOTHING_RICH, is_physical, person_of
 

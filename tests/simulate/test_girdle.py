@@ -12,7 +12,7 @@ from bsip_cli.simulate.kinematics import RHYTHM_RAD, clavicle_turn
 from bsip_cli.simulate.numerics import euler_zxy, rotate, transpose
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import draw_person
-from bsip_cli.simulate.trial import simulate_trial
+from bsip_cli.simulate.recording import simulate_trial
 
 PLAIN = Richness()
 GIRDLE = replace(PLAIN, girdle=True)

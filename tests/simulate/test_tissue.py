@@ -9,9 +9,8 @@ import pytest
 
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person, draw_person
-from bsip_cli.simulate.recording import marker_paths, rigid_paths
+from bsip_cli.simulate.recording import marker_paths, rigid_paths, simulate_trial
 from bsip_cli.simulate.study import wobbling
-from bsip_cli.simulate.trial import simulate_trial
 
 LIGHT = replace(Richness(), marker_noise_m=0.0, marker_drift_m=0.0, gaps=False)
 MEASURED = replace(LIGHT, measured_tissue=True)

@@ -9,7 +9,7 @@ from bsip_cli.simulate.kinematics import ground_wrench, momentum_of
 from bsip_cli.simulate.numerics import about_z
 from bsip_cli.simulate.people import Inertia
 from bsip_cli.simulate.plan import GRAVITY, Poses
-from bsip_cli.simulate.trial import Trial
+from bsip_cli.simulate.recording import Trial
 
 STEP_S = 0.001
 STANDING = ("static", "sequence", "squat", "throwing")

@@ -114,7 +114,7 @@ def test_published_tables_come_along(installed):
 def test_a_broken_cache_changes_nothing(installed):
     installed.bsip("run", "study", "--out", "out")  # nothing to do, if the test before has run
     before, kept = installed.results(), sorted(installed.temporary.rglob("*.nbc"))
-    assert len(kept) > 20
+    assert len(kept) >= 20
     for k, file in enumerate(kept):
         file.write_bytes(file.read_bytes()[:1000] if k % 2 else b"garbage")
     installed.bsip("ik", "study", "--out", "out", "--force")

@@ -33,7 +33,12 @@ def mjcf_text(body: IdentifiedPerson) -> str:
     for i, parent in enumerate(body.person.skeleton.parents):
         above = elements[parent] if parent >= 0 else world
         elements.append(_add_body(above, body, i))
-    _add_sites(elements, body)
+    for name, segment, place in body.markers():
+        own = elements[
+            segment
+        ]  # sites go before the child bodies, which is how such files are read
+        first = next((k for k, one in enumerate(own) if one.tag == "body"), len(own))
+        own.insert(first, ET.Element("site", name=name, pos=numbers(place)))
     return xml_text(root, declared=False)
 
 
@@ -64,11 +69,3 @@ def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
         fullinertia=numbers([inertia.tensor_kgm2[entry] for entry in _MOMENTS]),
     )
     return element
-
-
-def _add_sites(elements: list[ET.Element], body: IdentifiedPerson) -> None:
-    for name, segment, place in body.markers():
-        # Sites go before the child bodies, which is how such files are read.
-        first = next((k for k, e in enumerate(elements[segment]) if e.tag == "body"), None)
-        site = ET.Element("site", name=name, pos=numbers(place))
-        elements[segment].insert(len(elements[segment]) if first is None else first, site)

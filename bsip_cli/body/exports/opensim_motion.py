@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.exports.identified import xml_comment, xml_text
-from bsip_cli.body.exports.osim import COORDINATES
+from bsip_cli.body.exports.osim import COORDINATES, add_texts
 from bsip_cli.body.skeleton import Skeleton
 
 LOADED_N = 20.0
@@ -87,16 +87,11 @@ def loads_xml(segments: Sequence[str], data_file: str, said: Sequence[str]) -> s
     top = ET.SubElement(document, "ExternalLoads", name="externalloads")
     objects = ET.SubElement(top, "objects")
     for segment in segments:
+        parts = {"force": _FORCE, "point": _POINT, "torque": _TORQUE}
+        where = {f"{part}_expressed_in_body": "ground" for part in ("force", "point")}
+        columns = {f"{part}_identifier": name.format(segment) for part, name in parts.items()}
         one = ET.SubElement(objects, "ExternalForce", name=segment)
-        for tag, text in (
-            ("applied_to_body", segment),
-            ("force_expressed_in_body", "ground"),
-            ("point_expressed_in_body", "ground"),
-            ("force_identifier", _FORCE.format(segment)),
-            ("point_identifier", _POINT.format(segment)),
-            ("torque_identifier", _TORQUE.format(segment)),
-        ):
-            ET.SubElement(one, tag).text = text
+        add_texts(one, {"applied_to_body": segment} | where | columns)
     ET.SubElement(top, "datafile").text = data_file
     return xml_text(document)
 
@@ -108,15 +103,9 @@ def setup_xml(
     ``external_loads_file``, beside it. The motion is smooth: no further filter."""
     document = _document(said)
     tool = ET.SubElement(document, "InverseDynamicsTool", name=name)
-    for tag, text in (
-        ("results_directory", "."),
-        *files.items(),
-        ("time_range", f"{from_s:.12g} {to_s:.12g}"),
-        ("forces_to_exclude", "Muscles"),
-        ("lowpass_cutoff_frequency_for_coordinates", "-1"),
-        ("output_gen_force_file", f"{name}.sto"),
-    ):
-        ET.SubElement(tool, tag).text = text
+    texts = {"results_directory": ".", **files, "time_range": f"{from_s:.12g} {to_s:.12g}"}
+    texts |= {"forces_to_exclude": "Muscles", "lowpass_cutoff_frequency_for_coordinates": "-1"}
+    add_texts(tool, texts | {"output_gen_force_file": f"{name}.sto"})
     return xml_text(document)
 
 

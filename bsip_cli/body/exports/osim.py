@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -41,7 +42,10 @@ def osim_text(body: IdentifiedPerson) -> str:
     for i, name in enumerate(body.person.skeleton.segments):
         set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
         _add_joint(joints, body, i)
-    _add_markers(markers, body)
+    for name, segment, place in body.markers():
+        on = f"/bodyset/{body.person.skeleton.segments[segment]}"
+        parts = {"socket_parent_frame": on, "location": numbers(place), "fixed": "true"}
+        add_texts(ET.SubElement(markers, "Marker", name=name), parts)
     return xml_text(document)
 
 
@@ -55,6 +59,12 @@ def set_inertia(element: ET.Element, inertia: Inertia) -> None:
         child.text = numbers(part)
 
 
+def add_texts(element: ET.Element, texts: Mapping[str, str]) -> None:
+    """An element with a text below another, for each tag."""
+    for tag, text in texts.items():
+        ET.SubElement(element, tag).text = text
+
+
 def _set_of(model: ET.Element, tag: str, name: str) -> ET.Element:
     return ET.SubElement(ET.SubElement(model, tag, name=name), "objects")
 
@@ -65,8 +75,7 @@ def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
     kind, name = skeleton.joint_types[i], skeleton.joints[i]
     parent = f"/bodyset/{skeleton.segments[skeleton.parents[i]]}" if i else "/ground"
     joint = ET.SubElement(joints, _JOINTS[kind], name=name)
-    ET.SubElement(joint, "socket_parent_frame").text = "in_parent"
-    ET.SubElement(joint, "socket_child_frame").text = "in_child"
+    add_texts(joint, {"socket_parent_frame": "in_parent", "socket_child_frame": "in_child"})
     coordinates = ET.SubElement(joint, "coordinates")
     for part in COORDINATES[kind]:
         coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{name}_{part}")
@@ -80,9 +89,8 @@ def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
         ("in_child", f"/bodyset/{skeleton.segments[i]}", person.child_tilt_rad[i], np.zeros(3)),
     ):
         offset = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
-        ET.SubElement(offset, "socket_parent").text = socket
-        ET.SubElement(offset, "translation").text = numbers(place)
-        ET.SubElement(offset, "orientation").text = numbers([tilt, 0.0, 0.0])
+        turned = {"translation": numbers(place), "orientation": numbers([tilt, 0.0, 0.0])}
+        add_texts(offset, {"socket_parent": socket} | turned)
     if kind != "revolute":
         _add_transform(joint, name, kind)
 
@@ -101,12 +109,3 @@ def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
         function = ET.SubElement(one, "LinearFunction" if is_free else "Constant", name="function")
         tag, value = ("coefficients", [1.0, 0.0]) if is_free else ("value", [0.0])
         ET.SubElement(function, tag).text = numbers(value)
-
-
-def _add_markers(markers: ET.Element, body: IdentifiedPerson) -> None:
-    for name, segment, place in body.markers():
-        marker = ET.SubElement(markers, "Marker", name=name)
-        socket = f"/bodyset/{body.person.skeleton.segments[segment]}"
-        ET.SubElement(marker, "socket_parent_frame").text = socket
-        ET.SubElement(marker, "location").text = numbers(place)
-        ET.SubElement(marker, "fixed").text = "true"

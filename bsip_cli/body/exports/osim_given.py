@@ -8,6 +8,7 @@ on each other by joint centres that both have.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 from copy import deepcopy
 from dataclasses import dataclass
 
@@ -15,11 +16,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.body_map import BodyGroup, BodyMap
 from bsip_cli.body.exports.identified import IdentifiedPerson, neutral_pose, xml_comment
 from bsip_cli.body.exports.osim import set_inertia
 from bsip_cli.body.inertia import Inertia
+from bsip_cli.body.skeleton import Skeleton, named_file
+from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
+from bsip_cli.files.regular import read_toml
 
 _BODIES = "Model/BodySet/objects/Body"
 
@@ -155,19 +158,15 @@ def _fit(model: GivenModel, group: BodyGroup, person: IdentifiedPerson) -> tuple
     skeleton = person.person.skeleton
     rotations, joints = neutral_pose(person.person)
     first = skeleton.index(group.segments[0])
-    theirs = np.array([_joint_centre(model, group, body) for _, body in group.joints])
+    placed, theirs = _placements(model, group), []
+    for _, body in group.joints:  # centre of the joint that carries it
+        joint, own = model.joints[body], body in placed
+        there = placed[body] * joint.in_child if own else placed[joint.parent] * joint.in_parent
+        theirs.append(there.translation)
     ways = [joints[skeleton.index(segment)] - joints[first] for segment, _ in group.joints]
-    shifts = theirs - np.array([rotations[first].T @ way for way in ways])
+    shifts = np.array(theirs) - np.array([rotations[first].T @ way for way in ways])
     shift = shifts.mean(axis=0)
     return shift, float(np.linalg.norm(shifts - shift, axis=1).max())
-
-
-def _joint_centre(model: GivenModel, group: BodyGroup, body: str) -> np.ndarray:
-    """(3,) centre of the joint that carries a body, in the group's frame."""
-    joint, placed = model.joints[body], _placements(model, group)
-    if body in placed:
-        return (placed[body] * joint.in_child).translation
-    return (placed[joint.parent] * joint.in_parent).translation
 
 
 def _shared(model: GivenModel, group: BodyGroup, whole: pin.Inertia) -> dict[str, Inertia]:
@@ -260,3 +259,100 @@ def _segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> pin.I
 
 def _read(inertia: pin.Inertia) -> Inertia:
     return Inertia(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))
+
+
+# --- which bodies of a model are which segments, as data (configs/opensim) ------------------------
+
+
+@dataclass(frozen=True)
+class BodyGroup:
+    """Bodies of a model that together are some of our segments.
+
+    Attributes
+    ----------
+    bodies : they share the mass in the proportions they have in the model; the first one's frame
+        is that of the group.
+    segments : united in the neutral pose, in the first one's axes.
+    joints : pairs (segment, body): the joint between the segment and its parent and the one
+        between the body and its parent are the same point.
+    """
+
+    bodies: tuple[str, ...]
+    segments: tuple[str, ...]
+    joints: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class BodyMap:
+    name: str
+    groups: tuple[BodyGroup, ...]
+
+    def bodies(self) -> set[str]:
+        return {body for group in self.groups for body in group.bodies}
+
+
+def load_body_map(name: str) -> BodyMap:
+    """Read a map: the name of a shipped one, or a path that ends in ``.toml``.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, or it is no map.
+    """
+    file = named_file("opensim", name, "map of bodies")
+    data = read_toml(file)
+    try:
+        groups = []
+        for row in data["groups"]:
+            joints = tuple((str(segment), str(body)) for segment, body in row["joints"])
+            groups.append(BodyGroup(_texts(row["bodies"]), _texts(row["segments"]), joints))
+        if not all(one.bodies and one.segments and one.joints for one in groups):
+            raise ValueError("a group without bodies, segments or joints")
+    except (KeyError, TypeError, ValueError) as error:
+        raise UsageError(
+            f"not a map of bodies ({error})",
+            file=file,
+            expected="[[groups]] with bodies, segments and joints",
+        ) from None
+    return BodyMap(file.stem, tuple(groups))
+
+
+def shipped_names() -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in shipped("opensim").glob("*.toml")))
+
+
+def fitting_map(bodies: Iterable[str]) -> BodyMap | None:
+    """The shipped map that fits a model with these bodies and explains most of them."""
+    known = set(bodies)
+    maps = [load_body_map(name) for name in shipped_names()]
+    fitting = [each for each in maps if each.bodies() <= known]
+    return max(fitting, key=lambda each: len(each.bodies()), default=None)
+
+
+def check_segments(body_map: BodyMap, skeleton: Skeleton) -> None:
+    """Every segment of the skeleton that has mass goes into exactly one group.
+
+    Raises
+    ------
+    UsageError
+        A segment is missing, stands twice, or is not one with mass of the skeleton.
+    """
+    named = [segment for group in body_map.groups for segment in group.segments]
+    jointed = {segment for group in body_map.groups for segment, _ in group.joints}
+    unknown = sorted({*named, *jointed} - set(skeleton.body_names))
+    lost = [segment for segment in skeleton.body_names if segment not in named]
+    twice = sorted({segment for segment in named if named.count(segment) > 1})
+    faults = (("unknown", unknown), ("left out", lost), ("more than once", twice))
+    said = [f"{fault}: {', '.join(found)}" for fault, found in faults if found]
+    if said:
+        raise UsageError(
+            f"segments of the skeleton are {'; '.join(said)}",
+            file=body_map.name,
+            expected="every segment in one group",
+        )
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+        raise TypeError(f"{value!r} is no list of names")
+    return tuple(value)

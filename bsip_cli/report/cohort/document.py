@@ -145,7 +145,10 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         drawn.append(Strip(title, values, names, far, one.good, one.limit))
         rows[one.name] = list(values)
         far_out += [
-            (f"{member.id} ({one.title.partition(' (')[0].lower()} {number(v)} {one.unit})", member)
+            (
+                f"{member.id} ({one.in_sentence().replace(' (COP)', '')} {number(v)} {one.unit})",
+                member,
+            )
             for member, v, is_out in zip(members, values, far, strict=True)
             if is_out
         ]
@@ -155,12 +158,12 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
     yield Picture(
         strips(drawn),
         "yardsticks",
-        "A dot per person, with the parameters to use; the line is the median. Blue: as good as "
-        "published (Hansen 2017, table 4; markers: a standing person). Red: large (Hicks 2015; "
-        "OpenSim's checklist).",
+        "A dot per person, with the parameters to use; the line is the median. COP: centre of "
+        "pressure. Blue: as good as published (Hansen 2017, table 4; markers: quiet stance). Red: "
+        "large (Hicks 2015; OpenSim's checklist).",
         "Strips of dots: errors per person.",
         "low and close together is good. All high: the laboratory. One high: that person.",
-        "",
+        "read the laboratory's part below, or the report of who lies far out.",
         pd.DataFrame(rows),
     )
     linked = tuple((words, member.link()) for words, member in far_out if member.link())

@@ -13,7 +13,7 @@ from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Sectio
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.effect_words import effect_title, parameter_label, place_label, size_words
 from bsip_cli.report.verdict import probability_words
-from bsip_cli.report.words import MISSING, capital, listing
+from bsip_cli.report.words import MISSING, capital, listing, true_minus
 
 SAID = ("named", "ambiguous")
 _NOT_RUN = "Nobody asked for the faults of the laboratory: run `bsip laboratory`."
@@ -22,7 +22,7 @@ _CAPTION = (
     "What was found, and of each other fault the likeliest place. Estimate: if the fault is there. "
     "Seen from: this size would be named in 95 of 100 laboratories with these recordings"
 )
-_ALONE = "Of one person what is wrong with the laboratory stands in the person's report."
+_ALONE = "Of one person what is wrong with the laboratory is in the person's report."
 _WHAT_TO_DO = (
     "Check what is named on the spot, as its sentence says, before any number is corrected. What is "
     "wrong in the same way with the model of every person here can look like a plate elsewhere."
@@ -76,7 +76,7 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
         text = f"Laboratory {laboratory}: {likeliest['sentence']}."
         if others:
             text += f" It may also be: {listing([_named(one) for one in others])}."
-        yield text
+        yield true_minus(text)
 
 
 def _named(row: Mapping[Any, Any]) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
@@ -87,19 +88,6 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
     return figure
 
 
-@dataclass(frozen=True, eq=False)
-class SegmentMasses:
-    """All (s,) over the segments; masses and standard deviations [kg], in 0..1 how much the data
-    decide."""
-
-    segments: tuple[str, ...]
-    rm_kg: np.ndarray
-    rm_mass_kg: np.ndarray
-    om_kg: np.ndarray
-    om_sd_kg: np.ndarray
-    data_share: np.ndarray
-
-
 def _ticks(axes: Axes, low: float, high: float) -> None:
     """Of a logarithmic axis."""
     axes.set_xlim(low, high)
@@ -110,24 +98,25 @@ def _ticks(axes: Axes, low: float, high: float) -> None:
 
 
 @house_style()
-def segment_masses(data: SegmentMasses) -> Figure:
-    """Three panels over the segments: masses, OM - RM with 95 % intervals, what the data decide."""
-    rows = np.arange(len(data.segments))
+def segment_masses(data: pd.DataFrame) -> Figure:
+    """Three panels over the segments (the index): masses ``rm_kg, rm_mass_kg, om_kg``, OM - RM with
+    95 % intervals (``om_sd_kg``), and in 0..1 how much the data decide (``data_share``)."""
+    rows = np.arange(len(data))
     figure = new_figure(22.0 + 4.8 * len(rows))
     masses, differences, shares = figure.subplots(1, 3, sharey=True, width_ratios=(3, 3, 1.5))
-    positive = np.where(data.om_kg > 0.0, data.om_kg, np.nan)
-    own = ((RM, data.rm_kg, 24), (RM_MASS, data.rm_mass_kg, 9), (OM, positive, 16))
+    positive = data["om_kg"].where(data["om_kg"] > 0.0)
+    own = ((RM, data["rm_kg"], 24), (RM_MASS, data["rm_mass_kg"], 9), (OM, positive, 16))
     for method, kg, size in own:
         line = line_of(method)
         style = {"facecolor": "white" if method == RM else line.colour, "edgecolor": line.colour}
         masses.scatter(kg, rows, marker=line.marker, s=size, label=method, **style)
     masses.set_xscale("log")
-    both = np.concatenate([data.rm_kg, positive])
+    both = np.concatenate([data["rm_kg"], positive])
     _ticks(masses, np.nanmin(both) / 1.35, np.nanmax(both) * 1.35)
     masses.set_xlabel("mass [kg] (log scale)")
     legend_above(masses)
     differences.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
-    spread = np.nan_to_num(Z95 * data.om_sd_kg)
+    spread = np.nan_to_num(Z95 * data["om_sd_kg"])
     dots: dict[str, Any] = {
         "fmt": "o",
         "ms": 4,
@@ -136,15 +125,15 @@ def segment_masses(data: SegmentMasses) -> Figure:
         "elinewidth": 1.1,
         "capsize": 2,
     }
-    differences.errorbar(data.om_kg - data.rm_kg, rows, xerr=spread, **dots)
+    differences.errorbar(data["om_kg"] - data["rm_kg"], rows, xerr=spread, **dots)
     differences.set_xlabel("OM − RM [kg], 95 % interval")
     shares.barh(rows, 100.0, height=0.55, color=FAINT)
-    shares.barh(rows, np.nan_to_num(100.0 * data.data_share), height=0.55, color=BLUE)
+    shares.barh(rows, np.nan_to_num(100.0 * data["data_share"]), height=0.55, color=BLUE)
     shares.set_xlim(0.0, 100.0)
     shares.set_xlabel("data decide [%]")
     for axes in (masses, differences, shares):
         tidy(axes, grid="both")
-    masses.set_yticks(rows, data.segments)
+    masses.set_yticks(rows, data.index)
     masses.set_ylim(len(rows) - 0.4, -0.6)
     return figure
 

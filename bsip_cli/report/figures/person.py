@@ -22,7 +22,7 @@ from bsip_cli.report.figures.canvas import (
     new_figure,
     plain,
 )
-from bsip_cli.report.records import clock_of, flags_of, signals_of
+from bsip_cli.report.records import clock_of, flags_of, measured_of
 
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
 _WIDE_MM, _HIGH_MM = 62.0, 92.0
@@ -49,7 +49,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     markers = projected(pose.markers_m, centre)
     axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=BLUE, mew=0.8, label="markers")
     points = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
-    if np.isfinite(pose.force_N).all():
+    if np.isfinite([pose.force_N, pose.force_at_m]).all():
         foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
@@ -86,7 +86,7 @@ def _tiles(ground_m: float, centre_m: np.ndarray) -> np.ndarray:
 
 # --- poses ----------------------------------------------------------------------------------------
 
-_FORCES = ("fx_N", "fy_N", "fz_N")
+_FORCES, _POINT = ["fx_N", "fy_N", "fz_N"], ["cop_ap_m", "cop_ml_m"]
 _HEAD_RADIUS_M = 0.1
 _ON_GROUND_PERCENTILE = 2.0
 
@@ -234,12 +234,11 @@ def _forces(
     force, point = np.full((len(times), 3), np.nan), np.full((len(times), 3), np.nan)
     if reconstruction is None or len(clock_of(reconstruction)) == 0:
         return force, point
-    clock = clock_of(reconstruction)
+    measured = measured_of(reconstruction)
+    clock = measured["time_s"].to_numpy()
     nearest = np.clip(np.searchsorted(clock, times - 1e-9), 0, len(clock) - 1)
-    seen = (np.abs(clock[nearest] - times) < 0.02) & flags_of(reconstruction, "valid")[nearest]
-    columns = [signals_of(reconstruction, name)["measured"] for name in _FORCES]
-    world = np.stack([column[nearest] for column in columns], axis=1)
-    ap, ml = (signals_of(reconstruction, f"cop_{name}_m")["measured"] for name in ("ap", "ml"))
-    force[seen] = (world @ axes.T)[seen]
-    point[seen] = np.stack([ap[nearest], ml[nearest], np.full(len(times), ground_m)], axis=1)[seen]
+    rows = measured.iloc[nearest]
+    seen = (np.abs(clock[nearest] - times) < 0.02) & rows["valid"].to_numpy(dtype=bool)
+    force[seen] = (rows[_FORCES].to_numpy() @ axes.T)[seen]
+    point[seen] = rows[_POINT].assign(ground_m=ground_m).to_numpy()[seen]
     return force, point

@@ -21,8 +21,8 @@ from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
     NOT_RUN,
+    corrected_sentence,
     probability_words,
-    put_right_sentence,
     verdict_of,
 )
 from bsip_cli.report.words import MISSING, number, percent
@@ -42,7 +42,7 @@ def section(record: ParticipantRecord) -> Section:
     named_from = percent(record.option("diagnosis", "named_from"))
     blocks = (
         *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
-        *(Paragraph(text) for text in (*put_right_sentence(events), *said.results)),
+        *(Paragraph(text) for text in (*corrected_sentence(events), *said.results)),
         *nearest(candidates_of(record.diagnosis)),
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),

@@ -22,7 +22,7 @@ from bsip_cli.report.blocks import (
     Terms,
 )
 from bsip_cli.report.errors import MARKERS, yardsticks
-from bsip_cli.report.figures.charts import SegmentMasses, marker_bars, segment_masses
+from bsip_cli.report.figures.charts import marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.participant import diagnosis, errors
 from bsip_cli.report.records import (
@@ -296,31 +296,40 @@ def _masses(record: ParticipantRecord) -> Iterator[Block]:
         )
         return
     om = om.reindex(rm.index)
-    rm_mass_kg = record.method(RM_MASS)["mass_kg"].reindex(rm.index).to_numpy(dtype=float)
-    labels = tuple(segment_label(name) for name in rm.index)
-    table, own = rm["mass_kg"].to_numpy(dtype=float), om["mass_kg"].to_numpy(dtype=float)
-    sd, share = (om[c].to_numpy(dtype=float) for c in ("mass_kg_sd", "mass_data_share"))
+    shown = pd.DataFrame(
+        {
+            "rm_kg": rm["mass_kg"],
+            "rm_mass_kg": record.method(RM_MASS)["mass_kg"].reindex(rm.index),
+            "om_kg": om["mass_kg"],
+            "om_sd_kg": om["mass_kg_sd"],
+            "data_share": om["mass_data_share"],
+        },
+        dtype=float,
+    )
+    labelled = shown.rename(index=segment_label)
     yield Picture(
-        segment_masses(SegmentMasses(labels, table, rm_mass_kg, own, sd, share)),
+        segment_masses(labelled),
         "masses",
         "Segment masses by table (RM), by the table times one number (RM+mass) and identified (OM), "
         "their difference, and how much of each the data decide.",
         "Points: segment masses; bars: how much the data decide.",
         "long bars to the right are good: the number is this person's. Short ones: it is the table's.",
         "do not read a difference into a mass that the data hardly decide.",
+        shown.rename_axis("segment").reset_index(),
     )
     shift_mm = 1e3 * np.linalg.norm(om[_COM].to_numpy() - rm[_COM].to_numpy(), axis=1)
     rows = [
         (
-            label,
-            number(table[k], 2),
-            with_spread(own[k], sd[k], 2),
-            signed(100.0 * (own[k] / table[k] - 1.0)),
-            number(shift_mm[k], 0),
-            Cell(percent(share[k]), "warning" if share[k] < _FROM_TABLE else ""),
+            str(label),
+            number(one["rm_kg"], 2),
+            with_spread(one["om_kg"], one["om_sd_kg"], 2),
+            signed(100.0 * (one["om_kg"] / one["rm_kg"] - 1.0)),
+            number(moved, 0),
+            Cell(percent(one["data_share"]), "warning" if one["data_share"] < _FROM_TABLE else ""),
         )
-        for k, label in enumerate(labels)
+        for (label, one), moved in zip(labelled.iterrows(), shift_mm, strict=True)
     ]
+    table, own = shown["rm_kg"], shown["om_kg"]
     total = ("whole body", number(table.sum(), 2), number(own.sum(), 2))
     change = signed(100.0 * (own.sum() / table.sum() - 1.0))
     yield Grid(

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
+from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.errors import (
     LEAST_TOLD_SIZE,
@@ -99,11 +100,12 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     """Component by component, all recordings together."""
     if record.budget is None or record.budget.empty:
         return
+    found = effects_in(record.causes)
     bars = []
     for component in COMPONENTS:
-        size, unit = size_of(record.budget, "", component)
+        size, unit = size_of(record.budget, component)
         if size >= LEAST_TOLD_SIZE:
-            parts = tuple((p.label, p.share) for p in pieces(record.budget, "", component))
+            parts = tuple((p.label, p.share) for p in pieces(record.budget, component, found))
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
@@ -117,7 +119,7 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
             "smaller where it is.",
             "a long bar of segment parameters: use OM. A long hatched bar in a large error: something "
             "is wrong that has no name here.",
-            record.budget,
+            record.budget[record.budget["trial"] == ""],
         )
 
 

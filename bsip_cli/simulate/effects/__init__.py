@@ -23,10 +23,7 @@ def pair_up(
     """Match names, sizes and targets in the order they are given.
 
     simulated : whether the effects are for simulated recordings or for measured ones.
-
-    Raises
-    ------
-    UsageError : unknown effect; not one size for each; targets for some effects only; a size
+    UsageError: unknown effect; not one size for each; targets for some effects only; a size
         out of bounds or a target that the effect cannot have.
     """
     for name in names:
@@ -35,15 +32,12 @@ def pair_up(
             raise UsageError(
                 f"unknown effect {name!r}, did you mean {near!r}?", expected=", ".join(EFFECTS)
             )
-    if len(sizes) != len(names):
-        raise UsageError(
-            f"{len(names)} effects with {len(sizes)} sizes", expected="one --size per --effect"
-        )
-    if len(targets) not in (0, len(names)):
-        raise UsageError(
-            f"{len(names)} effects with {len(targets)} targets",
-            expected="no --target, or one per --effect (- for none)",
-        )
+    for what, found, allowed, rule in (
+        ("sizes", sizes, (len(names),), "one --size per --effect"),
+        ("targets", targets, (0, len(names)), "no --target, or one per --effect (- for none)"),
+    ):
+        if len(found) not in allowed:
+            raise UsageError(f"{len(names)} effects with {len(found)} {what}", expected=rule)
     asked = tuple(map(Asked, names, sizes, targets or [""] * len(names)))
     for one in asked:
         effect = drawn(one, np.random.default_rng(0))

@@ -75,20 +75,18 @@ class Effect:
     def __init_subclass__(cls, name: str = "") -> None:
         if not name:  # a base of several
             return
-        row = TABLE[name]
+        row, KINDS[name] = TABLE[name], cls
         cls.name, cls.unit, cls.hint = name, row["unit"], row["hint"]
         cls.least, cls.most = float(row["least"]), float(row["most"])
-        commas, spaces = (
-            {"segments": between.join(SEGMENTS), "joints": between.join(JOINTS)}
-            for between in (", ", " ")
-        )
-        cls.targets = row["targets"].format(**commas)
-        cls.choices = row["choices"].format(**spaces).split()
+        every = {"segments": SEGMENTS, "joints": JOINTS}
+        cls.targets = row["targets"].format(**{k: ", ".join(x) for k, x in every.items()})
+        cls.choices = row["choices"].format(**{k: " ".join(x) for k, x in every.items()}).split()
         cls.settings, cls.needs = row["settings"].split(), row["needs"].split()
-        cls.spares_static = row["spares_static"] == "yes"
-        cls.injectable = row["injectable"] == "yes"
+        cls.spares_static, cls.injectable = (
+            row["spares_static"] == "yes",
+            row["injectable"] == "yes",
+        )
         cls.personal = row["drawn_for"] == "person"
-        KINDS[name] = cls
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

@@ -365,11 +365,8 @@ def with_mass_at(
     as they share the person's weight. What it would have done to the movement is left out.
 
     where : a segment, or labels joined by "+". hold : (N,) 1 while it is carried.
-
-    Raises
-    ------
-    UsageError : no such marker.
-    BadDataError : the markers are lost for more than half of the trial.
+    UsageError: no such marker.
+    BadDataError: the markers are lost for more than half of the trial.
     """
     times, samples = instruments.frame_times_s(), instruments.sample_times_s()
     spline = make_interp_spline(times, _smooth_path(instruments, where), k=5)

@@ -11,8 +11,15 @@ import numpy as np
 
 from bsip_cli.simulate.movements.gait import running, walking
 from bsip_cli.simulate.movements.jumps import basketball, hops
-from bsip_cli.simulate.movements.sequence import sequence
-from bsip_cli.simulate.movements.standing import postures, squat, static, stepon, steps, throwing
+from bsip_cli.simulate.movements.standing import (
+    postures,
+    sequence,
+    squat,
+    static,
+    stepon,
+    steps,
+    throwing,
+)
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bsip_cli.simulate.numerics import glide, step
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
-from bsip_cli.simulate.plan import STEP_S, G, Plan, Sketch, add_breath_of_motion
+from bsip_cli.simulate.plan import STEP_S, G, Plan, Sketch, add_breath_of_motion, other_side
 
 LONGEST_REACH = 0.985  # the knee stays bent, about 20 degrees
 STEPS = range(-8, 8)  # planned before and after the one on the plate
@@ -44,8 +44,7 @@ class Gait:
 
     def side_of(self, k: int) -> str:
         """The foot of step k."""
-        other = "l" if self.first_side == "r" else "r"
-        return self.first_side if k % 2 == 0 else other
+        return self.first_side if k % 2 == 0 else other_side(self.first_side)
 
 
 def walking(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:

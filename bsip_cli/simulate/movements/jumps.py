@@ -14,9 +14,8 @@ from bsip_cli.simulate.plan import (
     G,
     Plan,
     Sketch,
-    add_breath_of_motion,
-    add_sway,
     held_ball,
+    moved_a_little,
     plate_under,
     sketch_for,
 )
@@ -96,8 +95,7 @@ def basketball(
     angles["waist"][:, 0] += soft_polyline(t, frames, lean, 0.06)
     sketch.pelvis_angles[:, 0] += soft_polyline(t, frames, 0.7 * lean, 0.06)
     angles["neck"][:, 0] -= soft_polyline(t, frames, 1.3 * lean, 0.06)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.3))
-    add_sway(sketch, rng, 0.6)
+    moved_a_little(sketch, rng, 0.3, 0.6)
     ball = held_ball(sketch, rng, side, release, ball_mass_kg)
     return _plan(sketch, rng, jump, _rise(sketch, jump), ball=ball, notes={"throwing_side": side})
 
@@ -138,8 +136,7 @@ def hops(person: Person, rng: np.random.Generator, duration_s: float, _ball: flo
     sketch.pelvis_angles[:, 0] -= lean
     sketch.angles["waist"][:, 0] -= 0.5 * lean
     sketch.angles["neck"][:, 0] += lean
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.3))
-    add_sway(sketch, rng, 0.6)
+    moved_a_little(sketch, rng, 0.3, 0.6)
     height = _rise(sketch, series)
     for landing in landings:
         length = STANCE_S if landing < last else catch

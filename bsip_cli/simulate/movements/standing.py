@@ -1,21 +1,23 @@
-"""On the plate: quiet stance, squats, an overarm throw, and postures that are held."""
+"""On the plate: quiet stance, squats, a throw, held postures, steps, and the sequence."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from bsip_cli.simulate.numerics import glide, soft_polyline, step, window
+from bsip_cli.simulate.numerics import glide, soft_polyline, step, wander, window
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import (
     FootSketch,
     Plan,
     Sketch,
-    add_breath_of_motion,
     add_squat,
-    add_sway,
     held_ball,
+    moved_a_little,
+    other_side,
     plate_under,
     sketch_for,
 )
@@ -39,8 +41,7 @@ def static(person: Person, rng: np.random.Generator, duration_s: float, _ball: f
     sketch = sketch_for(person, duration_s)
     for side in SIDES:
         sketch.angles[f"shoulder_{side}"][:, 1] += np.deg2rad(13.0)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.15))
-    add_sway(sketch, rng, 0.4)
+    moved_a_little(sketch, rng, 0.15, 0.4)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng))
 
 
@@ -55,8 +56,7 @@ def squat(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
     add_squat(sketch, down, 0.16 * person.stature_m)
     for side in SIDES:
         sketch.angles[f"shoulder_{side}"][:, 0] += np.deg2rad(rng.uniform(55.0, 75.0)) * down
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
-    add_sway(sketch, rng)
+    moved_a_little(sketch, rng, 0.4)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
 
 
@@ -92,18 +92,12 @@ def throwing(
     add_squat(sketch, dip, 0.04 * person.stature_m)
     for name in SIDES:
         angles[f"wrist_{name}"][:, 2] -= np.deg2rad(20.0) * dip
-    ahead = 0.25 * soft_polyline(sketch.t_s, frames, np.array([0, -1.0, 0.6, 1.0, 0]), 0.08)
-    feet[other].share += ahead
-    feet[side].share -= ahead
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
-    add_sway(sketch, rng, 0.6)
-    ball = held_ball(sketch, rng, side, release, ball_mass_kg)
-    return sketch.plan(
-        plate_centre_m=plate_under(sketch, rng),
-        sway_share=0.3,
-        ball=ball,
-        notes={"throwing_side": side},
-    )
+    ahead = soft_polyline(sketch.t_s, frames, np.array([0, -1.0, 0.6, 1.0, 0]), 0.08)
+    sketch.shift_load(side, 0.25 * ahead)
+    moved_a_little(sketch, rng, 0.4, 0.6)
+    ball, notes = held_ball(sketch, rng, side, release, ball_mass_kg), {"throwing_side": side}
+    centre = plate_under(sketch, rng)
+    return sketch.plan(plate_centre_m=centre, sway_share=0.3, ball=ball, notes=notes)
 
 
 def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
@@ -120,8 +114,7 @@ def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball:
                 sketch.angles[f"shoulder_{side}"][:, number - 1] += np.deg2rad(80.0) * held
         else:
             _raise_leg(sketch, SIDES[number % 2], number < 5, (start, end, shift), held)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.2))
-    add_sway(sketch, rng)
+    moved_a_little(sketch, rng, 0.2)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
 
 
@@ -130,10 +123,8 @@ def _raise_leg(
 ) -> None:
     """Stand on the other leg for the middle of (start, end), and hold the foot ahead and up."""
     start, end, shift = times_s
-    other, foot, stature = SIDES[side == "l"], sketch.feet[side], sketch.person.stature_m
-    part = 0.5 * window(sketch.t_s, start, end, 0.5 * shift)
-    sketch.feet[side].share -= part
-    sketch.feet[other].share += part
+    foot, stature = sketch.feet[side], sketch.person.stature_m
+    sketch.shift_load(side, 0.5 * window(sketch.t_s, start, end, 0.5 * shift))
     lifted = held * window(sketch.t_s, start + 0.5 * shift, end - 0.5 * shift, 0.8 * shift)
     ahead, up, tilt_deg = (0.14, 0.22, 0.0) if bent else (0.30, 0.16, 35.0)
     foot.raised_m[:, 0] += ahead * stature * lifted
@@ -161,7 +152,6 @@ def steps(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
     sketch = sketch_for(person, duration_s)
     t, moments = sketch.t_s, MOMENTS * duration_s
     side = str(rng.choice(SIDES))
-    other = "l" if side == "r" else "r"
     reach = 0.23 * person.stature_m * rng.uniform(0.95, 1.05)
     floor_share = rng.uniform(0.35, 0.55)
     foot = sketch.feet[side]
@@ -171,10 +161,9 @@ def steps(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
     on_plate = 1.0 - step(t, moments[0], moments[1]) + step(t, moments[6], moments[7])
     on_floor = step(t, moments[2], moments[3]) - step(t, moments[4], moments[5])
     foot.share[:] = 0.5 * on_plate + floor_share * on_floor
-    sketch.feet[other].share[:] = 1.0 - foot.share
+    sketch.feet[other_side(side)].share[:] = 1.0 - foot.share
     _swing_arms(sketch, side, 15.0, ahead)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
-    add_sway(sketch, rng, 0.3)
+    moved_a_little(sketch, rng, 0.4, 0.3)
     plate_ahead, plate_aside = plate_under(sketch, rng)
     return sketch.plan(
         plate_centre_m=(plate_ahead - EDGE_CLOSER_M, plate_aside),
@@ -187,7 +176,6 @@ def stepon(person: Person, rng: np.random.Generator, duration_s: float, _ball: f
     """Two steps ahead: from the floor onto the plate, and from it onto the floor."""
     sketch = sketch_for(person, duration_s)
     first = str(rng.choice(SIDES))
-    second = "l" if first == "r" else "r"
     length = person.lengths_m[f"foot_{first}"]
     reach = HALF_PLATE_M + CLEARANCE_M + 0.73 * length - sketch.mid_foot_m()
     reach += rng.uniform(0.0, 0.03)
@@ -195,23 +183,22 @@ def stepon(person: Person, rng: np.random.Generator, duration_s: float, _ball: f
         foot.ahead_m -= reach
     on, off = ON * duration_s, OFF * duration_s
     for moments in (on, off):
-        _step(sketch, first, second, moments, reach)
-    for side, leave, land in ((first, 1, 2), (second, 3, 4)):  # from mid-swing to mid-swing
+        _step(sketch, first, moments, reach)
+    for side, leave, land in (
+        (first, 1, 2),
+        (other_side(first), 3, 4),
+    ):  # from mid-swing to mid-swing
         start, end = np.mean((on[leave], on[land])), np.mean((off[leave], off[land]))
         sketch.feet[side].on_plate[:] = (sketch.t_s > start) & (sketch.t_s < end)
     sketch.pelvis_m[:, 0] += 0.5 * (sketch.feet["l"].ahead_m + sketch.feet["r"].ahead_m)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
-    add_sway(sketch, rng, 0.3)
-    return sketch.plan(
-        plate_centre_m=(sketch.mid_foot_m(), rng.normal(0.0, 0.03)),
-        sway_share=0.2,
-        notes={"first_side": first},
-    )
+    moved_a_little(sketch, rng, 0.4, 0.3)
+    centre, notes = (sketch.mid_foot_m(), rng.normal(0.0, 0.03)), {"first_side": first}
+    return sketch.plan(plate_centre_m=centre, sway_share=0.2, notes=notes)
 
 
-def _step(sketch: Sketch, first: str, second: str, moments: np.ndarray, reach_m: float) -> None:
+def _step(sketch: Sketch, first: str, moments: np.ndarray, reach_m: float) -> None:
     """Bring first one foot, then the other, ahead by reach_m."""
-    t = sketch.t_s
+    t, second = sketch.t_s, other_side(first)
     unload, leave, land, loaded, close, even = moments
     for side, start, end in ((first, leave, land), (second, loaded, close)):
         foot = sketch.feet[side]
@@ -222,8 +209,7 @@ def _step(sketch: Sketch, first: str, second: str, moments: np.ndarray, reach_m:
     foot.cop_ahead_m += 0.25 * reach_m * heel_up
     # the second foot's part: half, all, none, half
     change = 0.5 * step(t, unload, leave) - step(t, land, loaded) + 0.5 * step(t, close, even)
-    sketch.feet[second].share += change
-    sketch.feet[first].share -= change
+    sketch.shift_load(first, change)
     _swing_arms(sketch, first, 14.0, step(t, leave, land) - step(t, loaded, close))
 
 
@@ -238,3 +224,193 @@ def _swing_arms(sketch: Sketch, side: str, degrees: float, ahead: np.ndarray) ->
     for name in SIDES:
         swing = -1.0 if name == side else 1.0
         sketch.angles[f"shoulder_{name}"][:, 0] += swing * np.deg2rad(degrees) * ahead
+
+
+# --- the identification sequence: blocks of movement in every joint, on two tracks at once --------
+
+# One track moves the trunk and the legs, the other the head and the arms; amplitudes, paces
+# and order are drawn, so that people differ.
+
+CYCLE_S = 27.0
+QUIET_S = 0.4
+DEEPEST_M_PER_S2 = 0.5  # depth of a squat per square of its half period
+FAST_HZ = (1.0, 2.0)
+
+
+def sequence(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
+    """Movements of all joints, slow and fast, small and large, for duration_s."""
+    sketch = sketch_for(person, duration_s)
+    upper = UPPER_TRACK
+    if "sternoclavicular_r" in person.joints_m:
+        sketch.angles |= {f"girdle_{side}": np.zeros((len(sketch.t_s), 2)) for side in SIDES}
+        upper = WITH_GIRDLE
+    cycles = max(1, round(duration_s / CYCLE_S))
+    for track in (LOWER_TRACK, upper):  # blocks one after the other, in drawn order in each cycle
+        weight = sum(share for _, share in track)
+        scale = (duration_s - 2.0 * QUIET_S) / (cycles * weight)
+        start = QUIET_S
+        for _ in range(cycles):
+            for index in rng.permutation(len(track)):
+                block, share = track[index]
+                block(Block(sketch, rng, start, start + share * scale))
+                start += share * scale
+    calm = window(sketch.t_s, 0.0, duration_s, 0.8)
+    for angle in sketch.angles.values():
+        for column in np.atleast_2d(angle.T):
+            column += calm * wander(sketch.t_s, rng, np.deg2rad(2.0), 0.2, 1.0)
+    moved_a_little(sketch, rng, 0.2)
+    return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.35)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A part of the sequence from start to end [s]; each method is a kind of movement."""
+
+    sketch: Sketch
+    rng: np.random.Generator
+    start: float
+    end: float
+
+    def wave(self, *pace_hz: float, ramp: float = 0.6) -> np.ndarray:
+        """A windowed oscillation (T,) of amplitude 1 at a drawn pace and phase."""
+        frequency = np.exp(self.rng.uniform(*np.log(pace_hz)))
+        phase = self.rng.uniform(0.0, 2.0 * np.pi)
+        carrier = np.sin(2.0 * np.pi * frequency * (self.sketch.t_s - self.start) + phase)
+        return self.window(ramp) * carrier
+
+    def window(self, ramp: float) -> np.ndarray:
+        """(T,) 1 inside the block."""
+        return window(self.sketch.t_s, self.start, self.end, ramp)
+
+    def size(self, low: Sequence[float], high: Sequence[float]) -> np.ndarray:
+        """Drawn amplitudes [rad] between bounds in degrees."""
+        return np.deg2rad(self.rng.uniform(low, high))
+
+    def trunk(self) -> None:
+        size, pace = self.size([22, 12, 18], [38, 22, 35]), (0.35, 1.1)
+        waist, bend = self.sketch.angles["waist"], self.wave(*pace)
+        bent = 0.6 * self.window(0.8) + 0.6 * bend
+        waist[:, 0] -= size[0] * bent
+        waist[:, 1] += size[1] * self.wave(*pace)
+        waist[:, 2] += size[2] * self.wave(*pace)
+        self.sketch.pelvis_angles[:, 0] -= 0.3 * size[0] * bent
+
+    def turn(
+        self,
+        angles: np.ndarray,
+        size: np.ndarray,
+        *pace_hz: float,
+        other: np.ndarray | None = None,
+        part: float = 0.0,
+    ) -> None:
+        """Swing each column of angles (T, k) by a size of its own (k,), and ``other`` by a part."""
+        for axis, amount in enumerate(size):
+            wave = self.wave(*pace_hz)
+            angles[:, axis] += amount * wave
+            if other is not None:
+                other[:, axis] += part * amount * wave
+
+    def twist(self) -> None:
+        waist, pelvis = self.sketch.angles["waist"], self.sketch.pelvis_angles
+        self.turn(waist, self.size([10, 8, 25], [18, 14, 40]), 0.7, 1.6, other=pelvis, part=0.25)
+
+    def squats(self) -> None:
+        count = max(1, round((self.end - self.start) / self.rng.uniform(1.15, 1.9)))
+        for a, b in pairwise(np.linspace(self.start, self.end, count + 1)):
+            down = window(self.sketch.t_s, a, b, 0.5 * (b - a))
+            depth = self.rng.uniform(0.08, 0.16) * self.sketch.person.stature_m
+            add_squat(self.sketch, down, min(depth, DEEPEST_M_PER_S2 * (0.5 * (b - a)) ** 2))
+
+    def lift_leg(self, side: str, out: float) -> None:
+        """Stand on one leg and move hip, knee and ankle of the other."""
+        t, foot = self.sketch.t_s, self.sketch.feet[side]
+        shift = min(0.9, 0.22 * (self.end - self.start))
+        self.sketch.shift_load(side, 0.5 * self.window(shift))
+        up, down = self.start + shift, self.end - shift
+        lifted = window(t, up, down, min(0.6, 0.4 * (down - up)))
+        stature = self.sketch.person.stature_m
+        inner = Block(self.sketch, self.rng, up, down)
+        waves = [inner.wave(0.7, 1.7, ramp=0.5) for _ in range(6)]
+        foot.raised_m[:, 0] += stature * (0.08 * lifted + 0.09 * waves[0]) * lifted
+        foot.raised_m[:, 1] += stature * (0.13 * lifted + 0.035 * waves[1] * lifted)
+        foot.raised_m[:, 2] += out * stature * (0.06 * lifted + 0.05 * waves[2]) * lifted
+        size = np.deg2rad([22.0, 10.0, 15.0])
+        foot.tilt_rad += size * np.stack(waves[3:], axis=1) * lifted[:, None]
+        foot.tilt_rad[:, 0] -= np.deg2rad(12.0) * lifted
+
+    def shift_weight(self) -> None:
+        """Rock from foot to foot and from heel to toe, and turn the pelvis."""
+        self.sketch.shift_load("l", 0.38 * self.wave(0.35, 0.7))
+        ahead = self.wave(0.35, 0.7)
+        for side in SIDES:
+            self.sketch.feet[side].cop_ahead_m += 0.045 * ahead
+        pelvis, waist = self.sketch.pelvis_angles, self.sketch.angles["waist"]
+        self.turn(pelvis, self.size([6, 4, 8], [12, 8, 15]), 0.5, 1.2, other=waist, part=-0.7)
+
+    def both_arms(self) -> None:
+        for side in SIDES:
+            self.arm_circle(side, 0.35, 0.8)
+
+    def arm_circle(self, side: str, *pace: float) -> None:
+        size, middle = self.size([35, 22, 20], [60, 38, 45]), self.window(0.8)
+        shoulder = self.sketch.angles[f"shoulder_{side}"]
+        shoulder[:, 0] += size[0] * (0.8 * middle + self.wave(*pace))
+        shoulder[:, 1] += size[1] * (1.2 * middle + self.wave(*pace))
+        shoulder[:, 2] += size[2] * self.wave(*pace)
+        bend = np.deg2rad(self.rng.uniform(10, 30))
+        self.sketch.angles[f"elbow_{side}"] += bend * (middle + self.wave(*pace))
+
+    def elbows(self) -> None:
+        middle = self.window(0.7)
+        for side in SIDES:
+            size = np.deg2rad(self.rng.uniform(30, 50))
+            self.sketch.angles[f"elbow_{side}"] += size * (1.05 * middle + self.wave(0.7, 1.8))
+            wave = self.wave(0.5, 1.0)
+            turn = np.deg2rad(self.rng.uniform(15, 40)) * wave
+            self.sketch.angles[f"shoulder_{side}"][:, 2] += turn
+
+    def wrists(self) -> None:
+        middle = self.window(0.7)
+        for side in SIDES:
+            bend = np.deg2rad(self.rng.uniform(50, 75))
+            self.sketch.angles[f"elbow_{side}"] += bend * middle
+            size = self.size([30, 10, 40], [50, 18, 65])
+            self.turn(self.sketch.angles[f"wrist_{side}"], size, 0.8, 2.2)
+
+    def head(self) -> None:
+        self.turn(self.sketch.angles["neck"], self.size([22, 15, 30], [38, 28, 55]), 0.5, 1.3)
+
+    def shrugs(self) -> None:
+        """Raise the shoulders, and bring them forward and back."""
+        for side in SIDES:
+            girdle = self.sketch.angles[f"girdle_{side}"]
+            self.turn(girdle, self.size([10, 10], [20, 20]), 0.5, 1.4)
+
+    def free(self) -> None:
+        """Arms, hands and head at once."""
+        self.head()
+        for side in SIDES:
+            self.arm_circle(side, 0.5, 1.2)
+            self.sketch.angles[f"wrist_{side}"][:, 2] += np.deg2rad(40.0) * self.wave(0.8, 1.6)
+
+
+Track = tuple[tuple[Callable[[Block], None], float], ...]
+"""Blocks, and their parts of a cycle."""
+LOWER_TRACK: Track = (
+    (Block.trunk, 3.6),
+    (Block.squats, 3.6),
+    (lambda block: block.lift_leg("r", 1.0), 4.8),
+    (Block.twist, 3.0),
+    (lambda block: block.lift_leg("l", -1.0), 4.8),
+    (Block.shift_weight, 3.0),
+)
+UPPER_TRACK: Track = (
+    (Block.both_arms, 3.6),
+    (lambda block: block.arm_circle("r", *FAST_HZ), 3.0),
+    (lambda block: block.arm_circle("l", *FAST_HZ), 3.0),
+    (Block.elbows, 3.2),
+    (Block.wrists, 3.2),
+    (Block.head, 3.0),
+    (Block.free, 3.6),
+)
+WITH_GIRDLE = (*UPPER_TRACK, (Block.shrugs, 3.2))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import product
 from math import copysign, inf, nan, pi, sqrt
 
@@ -19,14 +18,11 @@ from bsip_cli.statistics.published.paper import (
     PrintedTable,
     Row,
     Slip,
-    agrees,
     as_meant,
     exchanged_cells,
     image,
-    mean_difference,
-    middle_of,
-    pairs_that_differ_by,
-    range_words,
+    place_words,
+    places,
 )
 
 
@@ -40,9 +36,9 @@ def _unlike(
 
 # --- the ways in which papers compute Cohen's d of two methods in the same people -----------------
 
-
-_PAIRED = "SD of the differences"
-_POOLED = "pooled SD of the two columns"
+# A difference of means, over a standard deviation of which only that of the differences is paired
+# as the test is; {a} and {b} are the first and the second method.
+_PAIRED, _POOLED = "SD of the differences", "pooled SD of the two columns"
 _HEDGES = f"{_POOLED}, corrected after Hedges"
 _BELOW: dict[str, Callable[[float, float], float]] = {
     _POOLED: lambda a, b: sqrt((a**2 + b**2) / 2),
@@ -54,45 +50,36 @@ _BELOW: dict[str, Callable[[float, float], float]] = {
 }
 _ABOVE: dict[str, Callable[[Interval], Interval]] = {
     "({b} - {a})": lambda d: d,
-    "({a} - {b})": Interval.negative,
+    "({a} - {b})": lambda d: -d,
     "|{b} - {a}|": Interval.size,
 }
 
 
-@dataclass(frozen=True)
-class Definition:
-    """A difference of means, over a standard deviation of which only that of the differences is
-    paired as the test is; both with {a} and {b} for the first and the second method."""
+def effect_size(above: str, below: str, table: PrintedTable, row: Row, paper: Paper) -> Interval:
+    """Cohen's d of a row by a definition."""
 
-    above: str
-    below: str
+    def effect(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float:
+        sd, difference = _BELOW[below](sd_a, sd_b), mean_b - mean_a
+        return difference / sd if sd > 0.0 else copysign(inf, difference) if difference else 0.0
 
-    def of(self, table: PrintedTable, row: Row, paper: Paper) -> Interval:
-        def effect(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float:
-            below, above = _BELOW[self.below](sd_a, sd_b), mean_b - mean_a
-            return above / below if below > 0.0 else copysign(inf, above) if above else 0.0
-
-        if self.below == _PAIRED:
-            found = image(lambda t: -t / sqrt(paper.participants), row.printed("t"))
-        else:
-            a, b = (row.cells[method] for method in table.methods)
-            found = image(effect, a.mean, a.spread(), b.mean, b.spread())
-        if self.below == _HEDGES:
-            factor = 1 - 3 / (8 * paper.participants - 9)
-            found = image(lambda d: factor * d, found)
-        return _ABOVE[self.above](found)
+    if below == _PAIRED:
+        found = image(lambda t: -t / sqrt(paper.participants), row.printed("t"))
+    else:
+        a, b = (row.cells[method] for method in table.methods)
+        found = image(effect, a.mean, a.spread(), b.mean, b.spread())
+    if below == _HEDGES:
+        found = image(lambda d: (1 - 3 / (8 * paper.participants - 9)) * d, found)
+    return _ABOVE[above](found)
 
 
-DEFINITIONS = tuple(Definition(above, below) for below in _BELOW for above in _ABOVE)
-
-
-def definition_of(paper: Paper, table: PrintedTable) -> tuple[Definition, int]:
+def definition_of(paper: Paper, table: PrintedTable) -> tuple[tuple[str, str], int]:
     """The definition that most rows follow, of equals the plainest, and how many do."""
 
-    def followers(one: Definition) -> int:
-        return sum(one.of(table, row, paper).meets(row.printed("d")) for row in table.rows)
+    def followers(one: tuple[str, str]) -> int:
+        found = ((effect_size(*one, table, row, paper), row.printed("d")) for row in table.rows)
+        return sum(computed.meets(printed) for computed, printed in found)
 
-    best = max(DEFINITIONS, key=followers)
+    best = max(((above, below) for below in _BELOW for above in _ABOVE), key=followers)
     return best, followers(best)
 
 
@@ -110,9 +97,9 @@ def group_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
         cells = [row.cells[method] for method in table.methods]
         means, sds = [cell.mean for cell in cells], [cell.spread() for cell in cells]
         f = f_of_groups(means, sds, paper.participants)
-        yield from _unlike(table, row, "F", f, range_words(f))
+        yield from _unlike(table, row, "F", f, f.words())
         p = image(lambda f: float(stats.f.sf(max(f, 0.0), *df)), row.printed("F"))
-        yield from _unlike(table, row, "p", p, range_words(p, 3))
+        yield from _unlike(table, row, "p", p, p.words(3))
     yield from _marks(table)
 
 
@@ -178,9 +165,9 @@ def paired_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     for row in table.rows:
         yield from _difference(table, row, exchange)
         t = t_of_interval(row.ends(), df)
-        yield from _unlike(table, row, "t", t, f"{range_words(t)} from the interval")
+        yield from _unlike(table, row, "t", t, f"{t.words()} from the interval")
         p = image(lambda t: float(2 * stats.t.sf(t, df)), row.printed("t").size())
-        small = "below .001" if p.high < 0.001 else range_words(p, 3)
+        small = "below .001" if p.high < 0.001 else p.words(3)
         found = f"{small} for the printed t with {df} degrees of freedom"
         yield from _unlike(table, row, "p", p, found)
         yield from _star(paper, table, row)
@@ -188,16 +175,18 @@ def paired_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
 
 
 def _difference(table: PrintedTable, row: Row, exchange: str) -> Iterator[Slip]:
-    if agrees(table, row):
+    if row.agrees():
         return
-    first, second = table.methods
-    found = pairs_that_differ_by(table, middle_of(row))
-    reading = exchange
-    if not exchange and len(found) == 1:
-        reading = f"interval and t belong to {found[0][0].words()} less {found[0][1].words()}"
-    printed = f"{first} - {second} = {mean_difference(table, row).middle:.2f}"
-    middle = f"the interval's middle is {range_words(middle_of(row))}"
-    yield table.slip(row.name, "means and interval", printed, middle, reading=reading)
+    every = places(table)
+    alike = [
+        f"{place_words(a)} less {place_words(b)}"
+        for a, b in product(every, repeat=2)
+        if (a[2].mean - b[2].mean).meets(row.middle())
+    ]
+    only = f"interval and t belong to {alike[0]}" if len(alike) == 1 else ""
+    printed = f"{' - '.join(table.methods)} = {row.difference().middle:.2f}"
+    middle = f"the interval's middle is {row.middle().words()}"
+    yield table.slip(row.name, "means and interval", printed, middle, reading=exchange or only)
 
 
 def t_of_interval(ends: tuple[Interval, Interval], df: int) -> Interval:
@@ -230,16 +219,16 @@ def _effect_sizes(paper: Paper, table: PrintedTable, meant: PrintedTable) -> Ite
         yield table.slip("all rows", what, "d", "no row follows any of the usual definitions")
         return
     for row, true in zip(table.rows, meant.rows, strict=True):
-        computed = definition.of(table, row, paper)
+        computed = effect_size(*definition, table, row, paper)
         if not computed.meets(row.printed("d")):
-            yield table.slip(row.name, what, row.tests["d"], range_words(computed))
+            yield table.slip(row.name, what, row.tests["d"], computed.words())
         elif row != true:
-            right = range_words(definition.of(table, true, paper))
+            right = effect_size(*definition, table, true, paper).words()
             found = f"computed from the means as printed; {right} from those that were meant"
             yield table.slip(row.name, what, row.tests["d"], found)
-    if definition.below != _PAIRED:
+    if _PAIRED not in definition:
         a, b = table.methods
-        formula = f"{definition.above} / {definition.below}".format(a=a, b=b)
+        formula = " / ".join(definition).format(a=a, b=b)
         printed = f"{formula} in {count} of {len(table.rows)} rows"
         found = "not the d of the differences, t / sqrt(n), though the test is paired"
         what = "definition of Cohen's d"
@@ -286,7 +275,7 @@ def _duration(stated: Interval, table: PrintedTable, rows: dict[str, Row]) -> It
     steps = (METRES[a] / METRES[b] for a in METRES for b in METRES)
     fits = any(Interval(whole.low * k, whole.high * k).meets(stated) for k in steps)
     where = f"{rows[LENGTH].name} / {rows[VELOCITY].name}"
-    printed, computed = f"the sequence lasts {stated.middle:g} s", f"{range_words(whole)} s"
+    printed, computed = f"the sequence lasts {stated.middle:g} s", f"{whole.words()} s"
     reading = "" if fits else "no choice of units makes it so"
     yield table.slip(where, "duration", printed, computed, reading=reading)
 
@@ -385,7 +374,7 @@ def _sums(body_mass_kg: Cell, table: PrintedTable) -> Iterator[Slip]:
         parts = [row.cells[method].mean for row in table.rows]
         whole = Interval(sum(one.low for one in parts), sum(one.high for one in parts))
         if not whole.meets(body_mass_kg.mean):
-            found = f"the segments of {method} add up to {range_words(whole)} kg"
+            found = f"the segments of {method} add up to {whole.words()} kg"
             printed = f"people of {body_mass_kg.text} kg"
             yield table.slip("sum of all rows", "body mass", printed, found)
 

@@ -13,36 +13,11 @@ from typing import Any, Literal
 
 from bsip_cli.errors import UsageError
 
-# --- one thing that a paper's own numbers say cannot be as printed --------------------------------
-
-
-@dataclass(frozen=True)
-class Slip:
-    """``printed`` beside ``recomputed`` as text; ``reading``: what was likely meant, if the numbers
-    allow only one. is_remark : worth knowing, but no contradiction by itself."""
-
-    paper: str
-    table: int
-    row: str
-    what: str
-    printed: str
-    recomputed: str
-    reading: str = ""
-    is_remark: bool = False
-
-
-def range_words(values: Interval, decimals: int = 2) -> str:
-    """2.41, or 2.41 to 2.45 where rounding matters."""
-    low, high = f"{values.low:.{decimals}f}", f"{values.high:.{decimals}f}"
-    return low if low == high else f"{low} to {high}"
-
-
 # --- numbers as print gives them: every one stands for all that round to it -----------------------
-
 
 _NUMBER = r"-?\d*\.?\d+"
 _CELL = re.compile(rf"(?P<mean>{_NUMBER})(?:\((?P<sd>{_NUMBER})\))?(?P<marks>\D*)")
-_RANGE = re.compile(rf"\[(?P<low>{_NUMBER}), (?P<high>{_NUMBER})\]")
+_RANGE = re.compile(rf"\[({_NUMBER}), ({_NUMBER})\]")
 
 
 @dataclass(frozen=True)
@@ -66,31 +41,30 @@ class Interval:
 
     def size(self) -> Interval:
         """Of the numbers without their sign."""
-        if self.low <= 0.0 <= self.high:
-            return Interval(0.0, max(-self.low, self.high))
-        return Interval(*sorted((abs(self.low), abs(self.high))))
+        ends = abs(self.low), abs(self.high)
+        return Interval(0.0 if self.low <= 0.0 <= self.high else min(ends), max(ends))
 
-    def negative(self) -> Interval:
+    def __neg__(self) -> Interval:
         return Interval(-self.high, -self.low)
 
     def __sub__(self, other: Interval) -> Interval:
         return Interval(self.low - other.high, self.high - other.low)
 
+    def words(self, decimals: int = 2) -> str:
+        """2.41, or 2.41 to 2.45 where rounding matters."""
+        low, high = f"{self.low:.{decimals}f}", f"{self.high:.{decimals}f}"
+        return low if low == high else f"{low} to {high}"
+
 
 def image(function: Callable[..., float], *arguments: Interval) -> Interval:
     """What a function makes of intervals; it must rise or fall with each argument throughout."""
-    corners = product(*((one.low, one.high) for one in arguments))
-    values = [function(*corner) for corner in corners]
+    values = [function(*corner) for corner in product(*((x.low, x.high) for x in arguments))]
     return Interval(min(values), max(values))
 
 
 def rounded_from(text: str) -> Interval:
-    """The numbers that are printed as ``text``.
-
-    ValueError: `text` is no number.
-    """
-    _, _, decimals = text.partition(".")
-    half = 0.5 * 10.0 ** -len(decimals)
+    """The numbers that are printed as ``text``; ValueError if that is no number."""
+    half = 0.5 * 10.0 ** -len(text.partition(".")[2])
     return Interval(float(text) - half, float(text) + half)
 
 
@@ -105,46 +79,43 @@ class Cell:
     marks: str
 
     def spread(self) -> Interval:
-        """The standard deviation.
-
-        ValueError: none is printed.
-        """
+        """The standard deviation; ValueError if none is printed."""
         if self.sd is None:
             raise ValueError(f"{self.text} has no standard deviation")
         return self.sd
 
     @classmethod
     def of(cls, text: str) -> Cell:
-        """From print.
-
-        ValueError: `text` is neither a number nor M(SD).
-        """
+        """From print; ValueError if that is neither a number nor M(SD)."""
         found = _CELL.fullmatch(text)
         if found is None:
             raise ValueError(f"neither a number nor M(SD): {text!r}")
         sd = rounded_from(found["sd"]) if found["sd"] else None
-        if sd is not None:
-            sd = Interval(max(sd.low, 0.0), sd.high)
+        sd = sd and Interval(max(sd.low, 0.0), sd.high)
         return cls(text, rounded_from(found["mean"]), sd, found["marks"])
 
 
-def range_of(text: str) -> tuple[Interval, Interval]:
-    """Both ends of a printed [low, high].
-
-    ValueError: `text` is no such range.
-    """
-    found = _RANGE.fullmatch(text)
-    if found is None:
-        raise ValueError(f"no range: {text!r}")
-    return rounded_from(found["low"]), rounded_from(found["high"])
-
-
-# --------------------------------------------------------------------------------------------------
-
+# --- tables and papers ----------------------------------------------------------------------------
 
 Design = Literal["paired", "groups", "described", "summary"]
 """A difference of two methods in the same people; groups compared as if independent; means
 alone; mean, median and maximum over so many values."""
+
+
+@dataclass(frozen=True)
+class Slip:
+    """What a paper's own numbers contradict: ``printed`` beside ``recomputed`` as text;
+    ``reading``: what was likely meant, if the numbers allow only one. is_remark : worth knowing,
+    but no contradiction by itself."""
+
+    paper: str
+    table: int
+    row: str
+    what: str
+    printed: str
+    recomputed: str
+    reading: str = ""
+    is_remark: bool = False
 
 
 @dataclass(frozen=True)
@@ -160,7 +131,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Row:
-    """``cells`` by method; ``tests`` as printed: t, p, d, F; ``ci`` the ends of the interval.
+    """``cells`` by method; ``tests`` as printed: t, p, d, F; ``ci_text`` the interval.
 
     key : the variable. compare : this study's variable, and its task after a space.
     error_of : the row of errors of the same path.
@@ -180,11 +151,24 @@ class Row:
         return rounded_from(self.tests[name].rstrip("*+"))
 
     def ends(self) -> tuple[Interval, Interval]:
-        """Of the interval of the mean difference.
+        """Of the interval of the mean difference; ValueError if none is printed."""
+        found = _RANGE.fullmatch(self.ci_text)
+        if found is None:
+            raise ValueError(f"no range: {self.ci_text!r}")
+        return rounded_from(found[1]), rounded_from(found[2])
 
-        ValueError: none is printed.
-        """
-        return range_of(self.ci_text)
+    def middle(self) -> Interval:
+        """Of the interval of the mean difference."""
+        return image(lambda low, high: 0.5 * (low + high), *self.ends())
+
+    def difference(self) -> Interval:
+        """Of the first method's mean less the second's."""
+        first, second = self.cells.values()
+        return first.mean - second.mean
+
+    def agrees(self) -> bool:
+        """Whether the difference of the means is the middle of the interval."""
+        return self.difference().meets(self.middle())
 
 
 @dataclass(frozen=True)
@@ -238,69 +222,56 @@ def names() -> tuple[str, ...]:
 
 @cache
 def load_paper(name: str) -> Paper:
-    """A paper by its key.
-
-    Raises
-    ------
-    UsageError
-        There is no such paper.
-    """
+    """A paper by its key; UsageError if there is none."""
     if name not in names():
         raise UsageError(f"there is no paper {name!r}", expected=", ".join(names()))
     data = tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
-    mass, duration = data.pop("body_mass_kg", ""), data.pop("sequence_s", "")
-    return Paper(
-        tables=tuple(_table(data["key"], **one) for one in data.pop("tables")),
-        body_mass_kg=Cell.of(mass) if mass else None,
-        sequence_s=rounded_from(duration) if duration else None,
-        **data,
-    )
+    data["tables"] = tuple(_table(data["key"], **one) for one in data["tables"])
+    for key, read in (("body_mass_kg", Cell.of), ("sequence_s", rounded_from)):
+        data |= {key: read(data[key])} if key in data else {}
+    return Paper(**data)
 
 
 def _table(
-    paper: str,
-    *,
-    rows: list[dict],
-    methods: list[str],
-    unit: str = "",
-    claims: list[dict] | None = None,
-    marks: dict[str, list[str]] | None = None,
-    **plain: Any,
+    paper: str, *, rows: list[dict[str, str]], methods: list[str], unit: str = "", **plain: Any
 ) -> PrintedTable:
     """A table of the file; ``plain``: what stands in it as it is."""
-    printed = tuple(_row(methods, **{"unit": unit} | one) for one in rows)
-    said = tuple(Claim(**one | {"but": tuple(one.get("but", ()))}) for one in claims or ())
-    unknown = {name for claim in said for name in claim.but} - {row.name for row in printed}
+    plain["rows"] = tuple(_row(methods, {"unit": unit} | one) for one in rows)
+    plain["marks"] = {sign: tuple(pair) for sign, pair in plain.get("marks", {}).items()}
+    claims = (one | {"but": tuple(one.get("but", ()))} for one in plain.get("claims", ()))
+    plain["claims"] = tuple(Claim(**one) for one in claims)
+    table = PrintedTable(paper, methods=tuple(methods), **plain)
+    unknown = {name for claim in table.claims for name in claim.but} - {r.name for r in table.rows}
     if unknown:
-        raise ValueError(f"{paper}, table {plain['number']}: no rows {', '.join(unknown)}")
-    signs = {sign: tuple(pair) for sign, pair in (marks or {}).items()}
-    named = tuple(methods)
-    return PrintedTable(paper, methods=named, rows=printed, claims=said, marks=signs, **plain)
+        raise ValueError(f"{paper}, table {table.number}: no rows {', '.join(unknown)}")
+    return table
 
 
-def _row(
-    methods: list[str], *, name: str, unit: str, key: str = "", ci: str = "", **printed: str
-) -> Row:
-    compare, error_of = printed.pop("compare", key), printed.pop("error_of", "")
+def _row(methods: list[str], printed: dict[str, str]) -> Row:
+    key = printed.pop("key", "")
+    plain = {"key": key, "compare": printed.pop("compare", key), "ci_text": printed.pop("ci", "")}
+    for name in ("name", "unit", "error_of"):
+        plain[name] = printed.pop(name, "")
     cells = {method: Cell.of(printed.pop(method)) for method in methods if method in printed}
     if unknown := set(printed) - {"t", "p", "d", "F"}:
-        raise ValueError(f"row {name}: unknown {', '.join(sorted(unknown))}")
-    return Row(name, key, unit, cells, printed, compare, ci, error_of)
+        raise ValueError(f"row {plain['name']}: unknown {', '.join(sorted(unknown))}")
+    return Row(cells=cells, tests=printed, **plain)
 
 
 # --- what was likely meant: the one change of a table after which its numbers agree ---------------
 
+Place = tuple[str, str, Cell]
+"""A cell of a table, behind its row and method."""
 
-@dataclass(frozen=True)
-class Place:
-    """A cell of a table."""
 
-    row: str
-    method: str
-    cell: Cell
+def places(table: PrintedTable) -> list[Place]:
+    """All cells."""
+    return [(row.name, method, cell) for row in table.rows for method, cell in row.cells.items()]
 
-    def words(self) -> str:
-        return f"{self.row} {self.method} ({self.cell.text})"
+
+def place_words(place: Place) -> str:
+    row, method, cell = place
+    return f"{row} {method} ({cell.text})"
 
 
 def exchanged_cells(table: PrintedTable) -> tuple[PrintedTable, str]:
@@ -308,47 +279,17 @@ def exchanged_cells(table: PrintedTable) -> tuple[PrintedTable, str]:
     their intervals, and which that is, in words; as it is, and nothing, if they agree as printed,
     or if no or several exchanges would do."""
     found: list[tuple[PrintedTable, str]] = []
-    for first, second in () if _agree(table) else combinations(_places(table), 2):
+    sound = all(row.agrees() for row in table.rows)
+    for first, second in () if sound else combinations(places(table), 2):
         rows = {row.name: row for row in table.rows}
-        for here, there in ((first, second), (second, first)):
-            cells = {**rows[here.row].cells, here.method: there.cell}
-            rows[here.row] = replace(rows[here.row], cells=cells)
-        undone = replace(table, rows=tuple(rows.values()))
-        if _agree(undone):
-            found.append((undone, f"{first.words()} and {second.words()} are exchanged"))
+        for (name, method, _), (*_, cell) in ((first, second), (second, first)):
+            rows[name] = replace(rows[name], cells={**rows[name].cells, method: cell})
+        if all(row.agrees() for row in rows.values()):
+            words = f"{place_words(first)} and {place_words(second)} are exchanged"
+            found.append((replace(table, rows=tuple(rows.values())), words))
     return found[0] if len(found) == 1 else (table, "")
-
-
-def pairs_that_differ_by(table: PrintedTable, difference: Interval) -> list[tuple[Place, Place]]:
-    """All two cells of a table whose means differ by so much."""
-    places = _places(table)
-    return [(a, b) for a in places for b in places if (a.cell.mean - b.cell.mean).meets(difference)]
 
 
 def as_meant(table: PrintedTable) -> PrintedTable:
     """The table with exchanged cells where they belong; as it is where none are."""
     return exchanged_cells(table)[0] if table.design == "paired" else table
-
-
-def middle_of(row: Row) -> Interval:
-    """Of the printed interval."""
-    return image(lambda low, high: 0.5 * (low + high), *row.ends())
-
-
-def mean_difference(table: PrintedTable, row: Row) -> Interval:
-    """Of the first method's mean less the second's."""
-    first, second = (row.cells[method] for method in table.methods)
-    return first.mean - second.mean
-
-
-def agrees(table: PrintedTable, row: Row) -> bool:
-    """Whether the difference of a row's means is the middle of its interval."""
-    return mean_difference(table, row).meets(middle_of(row))
-
-
-def _agree(table: PrintedTable) -> bool:
-    return all(agrees(table, row) for row in table.rows)
-
-
-def _places(table: PrintedTable) -> list[Place]:
-    return [Place(row.name, m, cell) for row in table.rows for m, cell in row.cells.items()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors, error_gain, pooled
+from bsip_cli.statistics.choice import BlockErrors, block_errors, error_gain, pooled
 
 N, BLOCK = 4000, 100
 BLOCKS = np.arange(N) // BLOCK

@@ -46,6 +46,9 @@ SHARE = 0.02
 LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
 SKIN_HZ = 8.0  # at which skin swings by itself
+# Part of critical damping, mean and standard deviation: from none to all, each as likely. Undamped
+# tissue would never be late, and its lag would pass for the clock's.
+SKIN_DAMPING = (1 / 2, 1 / np.sqrt(12))
 _UNKNOWN_RMS_M = 0.004  # of a marker whose residuals are not known
 WANDER_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
 _SLOWER_HZ = 0.3
@@ -111,7 +114,7 @@ def error_terms(
         name = skeleton.segments[segment]
         yield Term(MARKERS, name, MARKERS, False, places)
         yield Term(SKIN, name, f"{SKIN} {name}", True, skin)
-        yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., k : k + 1])
+        yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., 2 * k : 2 * k + 2])
     yield Term(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
     yield Term(SKIN, "", f"{SKIN} wanders", True, wander(scene))
     yield Term(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
@@ -201,18 +204,26 @@ def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _skin_inertia(scene: Scene) -> np.ndarray:
-    """(N, 6, s) changes of the wrench if the skin of each segment swings on, one by one.
-
-    Skin is held elastically: where its bone is accelerated by a it stays behind by -a / w^2, with
-    w the pace at which it swings by itself. So markers overshoot slightly wherever they turn back.
-    """
-    give, columns = (2 * np.pi * SKIN_HZ) ** -2, []
+    """(N, 6, 2 s) changes of the wrench if the skin of each segment swings on, one by one."""
+    columns = []
     for segment in np.unique(scene.person.marker_segments).tolist():
         markers = np.flatnonzero(scene.person.marker_segments == segment).tolist()
-        behind = -give * scene.motion.acceleration_m_s2[:, segment]
-        errors = np.broadcast_to(behind[:, None, :, None], (len(behind), len(markers), 3, 1))
+        behind = stays_behind(scene.motion.acceleration_m_s2[:, segment], scene.rate_hz)
+        errors = np.broadcast_to(behind[:, None], (len(behind), len(markers), 3, 2))
         columns.append(scene.pose_response.of(errors, markers))
     return scene.response.of(np.concatenate(columns, axis=2))
+
+
+def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
+    """How far (N, ..., 2) soft tissue stays behind bones that are accelerated by a (N, ...).
+
+    It is held by a spring and a damper: far below the pace w at which it swings by itself that is
+    -(a - 2 z a' / w) / w^2. So markers overshoot slightly, and late, where they turn back. Of z
+    only mean and standard deviation are known, which two courses of unit variance say as well.
+    """
+    pace, (mean, sd) = 2 * np.pi * SKIN_HZ, SKIN_DAMPING
+    later = 2 / pace * np.gradient(acceleration, 1 / rate_hz, axis=0)
+    return np.stack([mean * later - acceleration, sd * later], axis=-1) / pace**2
 
 
 def wander(scene: Scene) -> np.ndarray:
@@ -251,11 +262,12 @@ def smoothing_bias(scene: Scene) -> np.ndarray:
 
 
 def _swinging_body(scene: Scene) -> np.ndarray:
-    """(N, 6, 1) if all soft tissue swings at SKIN_HZ: the wrench' second derivative over w^2."""
+    """(N, 6, 2) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is."""
     place = standing_place_m(scene)
     course = move_moments(scene.predicted, place)
     bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
-    return move_moments(bent, -place)[..., None] / (2 * np.pi * SKIN_HZ) ** 2
+    behind = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)
+    return np.stack([-move_moments(one, -place) for one in behind], axis=-1)
 
 
 def noise_of_instruments(

@@ -2,9 +2,15 @@
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, freqs, sosfiltfilt
 
-from bsip_cli.diagnosis.error_terms import WANDER_M, smoothing_bias, wander
+from bsip_cli.diagnosis.error_terms import (
+    SKIN_HZ,
+    WANDER_M,
+    smoothing_bias,
+    stays_behind,
+    wander,
+)
 from tests.effects.moving_scene import moving
 
 
@@ -27,3 +33,17 @@ def test_the_bias_tells_what_a_low_pass_takes():
     lost = scene.predicted[:, 2] - sosfiltfilt(sections, scene.predicted[:, 2])
     inner = slice(60, -60)
     assert np.corrcoef(force[inner], lost[inner])[0, 1] == pytest.approx(1.0, abs=0.2)
+
+
+def test_tissue_stays_behind_as_what_hangs_on_a_spring_and_a_damper_does():
+    """In size and in lateness, of paces below its own and of any damping up to critical."""
+    rate_hz, own = 1000.0, 2 * np.pi * SKIN_HZ
+    times_s = np.arange(0, 2, 1 / rate_hz)
+    turn, every = np.exp(2j * np.pi * times_s), slice(1, -1, 20)
+    dampings = np.linspace(0, 1, 101)
+    exact = [freqs([-1.0], [1.0, 2 * z * own, own**2], [2 * np.pi])[1][0] for z in dampings]
+    courses = np.outer(exact, turn).real[:, every]
+    told = stays_behind(turn.real, rate_hz)[every]
+    expected = courses.T @ courses / len(courses)
+    np.testing.assert_allclose(told @ told.T, expected, atol=0.05 * np.abs(expected).max())
+    np.testing.assert_allclose(told[:, 0], courses[50], atol=0.05 * np.abs(courses).max())

@@ -411,7 +411,7 @@ def consequences(
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
-    known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
+    known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
     lab = ((_OF_THE_LAB, ""),) if all(one.scope == "laboratory" for one in cause) else ()
     return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 

@@ -162,7 +162,7 @@ def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding
     target = person.skeleton.segments[max(on, key=on.count)]
     said = (
         f"soft tissue moves {len(shaken)} markers ({', '.join(one.target for one in shaken)}) by "
-        f"{min(sizes):.0f} to {max(sizes):.0f} mm from "
+        f"{' to '.join(dict.fromkeys(f'{one:.0f}' for one in (min(sizes), max(sizes))))} mm from "
         f"{min(float(one.values[3]) for one in shaken):.2f} s on"
     )
     p_value = max(one.p_value for one in shaken)

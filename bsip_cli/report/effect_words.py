@@ -79,10 +79,9 @@ def place_label(effect: str, target: str) -> str:
     if effect.startswith("marker_"):
         first, _, second = target.partition("+")
         return f"markers {first} and {second}" if second else f"marker {target}"
-    if effect == "joint_centre" or target in SEGMENTS:
-        return segment_label(target)
-    if effect == "unmeasured_contact":
-        return " and ".join(segment_label(name) for name in target.split("+"))
+    parts = target.split("+")
+    if effect == "joint_centre" or all(part in SEGMENTS for part in parts):
+        return " and ".join(segment_label(part) for part in parts)
     return _WORDS["channels"].get(target, target)
 
 

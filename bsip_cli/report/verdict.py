@@ -48,6 +48,7 @@ from bsip_cli.report.words import (
     segment_label,
     signed,
     trial_label,
+    with_article,
 )
 from bsip_cli.statistics.methods import OM, RM
 
@@ -178,7 +179,7 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
     faults = len(found) - len(objects) - len(unnamed)
     parts = [count(faults, "fault")] if faults else []
     parts += [f"{count(len(unnamed), 'error')} of unknown cause"] if unnamed else []
-    parts += dict.fromkeys(effect_title(one.effect) for c in objects for one in c)
+    parts += dict.fromkeys(with_article(effect_title(one.effect)) for c in objects for one in c)
     return f"{listing(parts)} found" if parts else ""
 
 
@@ -190,7 +191,7 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
     if most is None or most.label in (UNKNOWN, REST):
         return f", {CAUSE_UNKNOWN}"
     if use == OM and PARAMETERS in most.label:
-        return " also with identified parameters"
+        return " even with identified parameters"
     how = "most" if most.share > 50.0 else "the largest part"
     return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 

@@ -78,7 +78,7 @@ _FEWEST = 5  # persons among whom one can lie far out
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
         title="Cohort: do motion and measured forces agree?",
-        subtitle="Ground forces computed from the motion, against the plates'.",
+        subtitle="Ground forces measured by plates, against those computed from markers.",
         front=tuple(_front(record)),
         sections=(
             Section("people", "Who took part?", (_people(record),)),

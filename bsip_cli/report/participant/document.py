@@ -78,7 +78,7 @@ def participant_document(record: ParticipantRecord) -> Document:
     made += how_made(HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
-        subtitle="Ground forces computed from the motion, against the plates'.",
+        subtitle="Ground forces measured by plates, against those computed from markers.",
         front=front(record),
         sections=(
             diagnosis.section(record),
@@ -219,11 +219,7 @@ def _markers(record: ParticipantRecord) -> Iterator[Block]:
 def _events(record: ParticipantRecord) -> Iterator[Block]:
     """What the inverse kinematics says of single markers; nothing where it was not asked."""
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
-    lines = [
-        f"{label}: {sentence} ({number(_MM * float(size), 0)} mm)"
-        for label, table in known
-        for sentence, size in zip(table["sentence"], table["size_m"], strict=True)
-    ]
+    lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
     if known and not lines:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
     elif lines:
@@ -357,13 +353,13 @@ def _next(record: ParticipantRecord) -> Iterator[Block]:
     combinations = table[table["quantity"] == "combinations"]
     silent = [segment_label(n) for n in combinations.loc[combinations["value"] == 0, "name"]]
     if silent:
-        yield Paragraph(f"The movement tells nothing of {listing(silent)} that the table does not.")
+        yield Paragraph(f"These recordings add nothing to the table for {listing(silent)}.")
     steps = table[table["quantity"] == "next"].head(_MOST_STEPS)
     if len(steps):
         yield Heading("What to record next time")
         yield Numbered(
             tuple(
-                f"{capital(row['text'])}: {number(row['value'])} per cent points more decided by the "
+                f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
                 f"data, most of all for the {segment_label(row['segment'])}."
                 for row in steps.to_dict("records")
             )

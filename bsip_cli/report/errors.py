@@ -155,7 +155,7 @@ def _compared(first: pd.Series) -> str:
         said = f"{om} than {table}, {over_scaled} than {times}"
     if first["use"] == OM:
         return f": {where}it errs {said}"
-    return f": OM (identified) is no sure gain; {where}it errs {said}"
+    return f": OM (identified) is not clearly better; {where}it errs {said}"
 
 
 def _change(ratio: float, log_error: float) -> str:

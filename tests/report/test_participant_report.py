@@ -215,7 +215,9 @@ def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(choice, record.identification)
     assert said.startswith("Use RM (segment parameters of an anthropometric table)")
-    assert ": OM (identified) is no sure gain; in 2 other recordings it errs 5 % less to" in said
+    assert (
+        ": OM (identified) is not clearly better; in 2 other recordings it errs 5 % less to" in said
+    )
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

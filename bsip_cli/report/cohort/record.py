@@ -222,7 +222,7 @@ def _asked(found: _Found, people: Sequence[Searched]) -> int:
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:
-    """From the least to the largest, and whether they may all be the same."""
+    """From the least to the largest, and whether they are equal within their intervals."""
     known = [n for n in numbers if n is not None]
     if len(known) < len(numbers) or len({n.name for n in known}) > 1:
         return ""
@@ -237,7 +237,7 @@ def _sizes(numbers: Sequence[Number | None]) -> str:
         return span
     if p_of_one_size(values, widths) < _DIFFER:
         return f"{span}; the sizes differ by more than their intervals"
-    return f"{span}; the sizes may all be the same"
+    return f"{span}, equal within their intervals"
 
 
 def named_people(names: Sequence[str]) -> str:

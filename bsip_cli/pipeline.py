@@ -232,7 +232,7 @@ is right within a factor of two in each. All other units take next to no time.""
 
 
 def cost_s(stage: str, level: str, trials: int) -> float:
-    """About how long a unit, of a person with so many trials, takes beside others [s]."""
+    """About how long a unit, of a person with so many trials, takes compared with others [s]."""
     unit = f"{stage} {level}"
     return _COSTS_S.get(unit, _SHORT_S) * (trials if unit == "diagnose participant" else 1)
 
@@ -250,7 +250,7 @@ def by_level(stages: Iterable[Stage]) -> tuple[tuple[Stage, ...], tuple[Stage, .
 
 
 def in_turn(stages: Iterable[Stage]) -> Iterator[tuple[Stage, ...]]:
-    """Stages of each participant, then those of all, and so on: what is told of all serves each."""
+    """Stages of each participant, then those of all, and so on: what all show serves each."""
     for _, same in groupby(stages, key=lambda stage: stage.level == "cohort"):
         yield tuple(same)
 

@@ -136,7 +136,7 @@ def named_file(folder: str, name: str, what: str) -> Path:
     Raises
     ------
     UsageError
-        There is no such file: the shipped names are told.
+        There is no such file: the shipped names are listed.
     """
     file = Path(name) if name.endswith(".toml") else shipped(folder, f"{name}.toml")
     if not os.path.lexists(file):

@@ -98,7 +98,7 @@ def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]
     Raises
     ------
     UsageError
-        No load is declared that tells them apart, a name fits no recording or both sets, or the
+        No load is declared that distinguishes them, a name fits no recording or both sets, or the
         recordings of one set carry different loads.
     """
     ready = unit.trials("kinematics", "wrench")
@@ -158,7 +158,7 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
 
 
 def _check_apart(unit: Unit, heavy: list[Trial], plain: list[Trial]) -> None:
-    """No recording is in both sets, and a declared load tells them apart."""
+    """No recording is in both sets, and a declared load distinguishes them."""
     twice = [trial.stem for trial in heavy if trial in plain]
     if twice:
         raise UsageError(

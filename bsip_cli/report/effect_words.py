@@ -149,7 +149,7 @@ _UNKNOWN = "look at plates, cables and everything that touches the person, and r
 
 
 def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
-    """What to record, without a final stop, for rivals as (effect, target); at most so many steps."""
+    """What to record, without a final stop, for causes that look alike, as (effect, target); at most so many steps."""
     effects = list(dict.fromkeys(effect for effect, _ in rivals))
     places = {one: {target for effect, target in rivals if effect == one} for one in effects}
     advice = [_places(effect, rivals) for effect in effects if len(places[effect]) > 1]

@@ -197,7 +197,7 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
-    """What, how large beside what laboratories meet, where and how sure, as short as possible."""
+    """What, how large compared with what laboratories meet, where and how sure, as short as possible."""
     sure = probability_words(probability_of(cause))
     if len(cause) > 1:
         return _group_line(cause, sure)

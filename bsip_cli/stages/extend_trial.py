@@ -1,4 +1,4 @@
-"""extend (trial): the extended model beside RM and OM, and its gain on data not used to size it."""
+"""extend (trial): the extended model, RM and OM, and its gain on data not used to size it."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def run(unit: Unit) -> None:
 def _scene(
     unit: Unit, person: Person, extended: pd.DataFrame
 ) -> tuple[Scene, dict[str, np.ndarray]]:
-    """The trial with the body beside which the causes were sized; parameters (10 n,) of OM and of
+    """The trial with the body for which the causes were sized; parameters (10 n,) of OM and of
     each extended model, loads included."""
     methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
     scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index(RM)]))

@@ -113,7 +113,7 @@ _TOLD = {
 
 
 def _limits(rows: pd.DataFrame) -> Iterator[str]:
-    """The smallest limit of each fault that is told in the sentence."""
+    """The smallest limit of each fault that the sentence mentions."""
     for (effect, parameter), words in _TOLD.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
         for best in mine.sort_values("limit").head(1).to_dict("records"):

@@ -167,7 +167,7 @@ def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]
 
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
-    alike; what most people have comes first. What the laboratory tells of itself is said there."""
+    alike; what most people have comes first. The laboratory's faults are in its own part."""
     shared = [found for found in _found(people) if len(found.people) > 1]
     shared.sort(key=lambda found: -len(found.people))
     said = [_told(found, people) for found in shared[:_MOST_TOLD]]

@@ -171,16 +171,17 @@ def light_of(
 
 
 def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
-    """``2 faults and 1 error of unknown cause found``; empty where nothing but a large error was.
-    What a task may be about is no fault."""
+    """``2 faults and 1 error of unknown cause found; a club, racket or stick in the hand``; empty
+    where nothing but a large error was. What a task may be about is no fault."""
     found = [cause for cause in causes if not is_large(cause)]
     objects = [c for c in found if all(one.effect in OBJECTS for one in c)]
     unnamed = [c for c in found if len(c) == 1 and c[0].effect == UNNAMED]
     faults = len(found) - len(objects) - len(unnamed)
     parts = [count(faults, "fault")] if faults else []
     parts += [f"{count(len(unnamed), 'error')} of unknown cause"] if unnamed else []
-    parts += dict.fromkeys(with_article(effect_title(one.effect)) for c in objects for one in c)
-    return f"{listing(parts)} found" if parts else ""
+    named = dict.fromkeys(with_article(effect_title(one.effect)) for c in objects for one in c)
+    found_here = f"{listing(parts)} found" if parts else ""
+    return "; ".join(filter(None, (found_here, listing([*named], ""))))
 
 
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:

@@ -197,6 +197,13 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     )
 
 
+def test_an_object_of_the_task_is_no_fault(found):
+    ball = found[found["rank"] == 1].assign(effect="released_object", class_id="", rank=9)
+    assert light_of(ball, detection(TRIALS)).title == "An object held and let go"
+    both = pd.concat([found, ball])
+    assert light_of(both, detection(TRIALS)).title == "2 faults found; an object held and let go"
+
+
 def test_something_that_cannot_be_named(found):
     row = found[found["effect"] == "plate_zero"].assign(
         effect=UNNAMED, verdict="named", class_id="", sentence="something goes along with fz"

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import (
+    WORDS,
     Block,
     Bullets,
     Cell,
@@ -89,6 +90,7 @@ def cohort_document(record: CohortRecord) -> Document:
             ),
             Section("tables", "The papers' tables", tuple(_tables(record))),
             Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
+            WORDS,
         ),
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import (
+    WORDS,
     Block,
     Bullets,
     Cell,
@@ -19,7 +20,6 @@ from bsip_cli.report.blocks import (
     Paragraph,
     Picture,
     Section,
-    Terms,
 )
 from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import marker_bars, segment_masses
@@ -56,21 +56,6 @@ CANNOT_KNOW = (
     "An error that is the same in all recordings can hide in the identified parameters.",
     "Frames are not independent: intervals allow for it.",
 )
-GLOSSARY = (
-    ("COP", "Centre of pressure: where on the plate the ground force acts."),
-    ("RM", "Regression method: segment parameters from an anthropometric table."),
-    ("RM+mass", "RM, all masses and tensors times one number, so that the plates' weight fits."),
-    ("OM", "Optimisation method: parameters identified from this person's movement and forces."),
-    ("OM+causes", "OM identified again with every named fault in the model."),
-    ("Segment parameters", "Mass, centre of mass and moments of inertia of a body segment."),
-    ("Data decide", "Part of the table's uncertainty that the recordings removed; 0: the table."),
-    ("Error budget", "What makes the squared difference of simulated and measured forces."),
-    ("Held out", "Data that identified nothing, on which methods are compared."),
-    ("Probability", "That a fault is there, given all else that was found."),
-    ("95 % interval", "Holds the true value in 95 of 100 such recordings."),
-    ("sd", "Standard deviation."),
-    ("BW", "Body weight."),
-)
 
 
 def participant_document(record: ParticipantRecord) -> Document:
@@ -87,7 +72,7 @@ def participant_document(record: ParticipantRecord) -> Document:
             parameters_section(record),
             recording_section(record),
             Section("made", "How was it made, and what can it not know?", tuple(made)),
-            Section("words", "What do the words mean?", (Terms(GLOSSARY),)),
+            WORDS,
         ),
     )
 

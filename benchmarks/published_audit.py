@@ -376,7 +376,7 @@ def _slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
 
 
 def _sums(body_mass_kg: Cell, table: PrintedTable) -> Iterator[Slip]:
-    """Each method's segments beside the body's mass."""
+    """Each method's segments against the body's mass."""
     for method in table.methods:
         parts = [row.cells[method].mean for row in table.rows]
         whole = Interval(sum(one.low for one in parts), sum(one.high for one in parts))

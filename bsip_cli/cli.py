@@ -189,10 +189,10 @@ def markers(**asked):
 def init(**asked):
     """Make a study of recordings: C3D files, and TRC files with their MOT or STO.
 
-    Files get the names that a study needs (sub-01_task-walking_run-1); static trials are told by
-    name and stillness; participants.tsv gets the mass, height and sex that files state, study.toml
-    the roles and the marker set, where no shipped one fits a first one made from the labels;
-    sources.tsv says what came from where, and what was not used and why.
+    Files get the names that a study needs (sub-01_task-walking_run-1); static trials are recognised
+    by name and stillness; participants.tsv gets the mass, height and sex that files state,
+    study.toml the roles and the marker set, where no shipped one fits a first one made from the
+    labels; sources.tsv says what came from where, and what was not used and why.
 
     Exit codes: 0 done; 2 usage, or the study's folder is not empty; 3 a recording cannot be used
     (the others are).

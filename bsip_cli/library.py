@@ -154,7 +154,7 @@ class Person:
     trials : recordings by name: a task, with ``_run-2`` where it was done again ("walking_run-2").
         ``static`` calibrates, ``sequence`` identifies, as ``options["roles"]`` says.
     sex : "M", "F" or "other" (the mean of both tables).
-    mass_kg, height_m : None where not known: then from the recordings, where they tell it.
+    mass_kg, height_m : None where not known: then from the recordings, where they decide it.
     options : as in study.toml, for example ``{"marker_set": "hansen2017"}``.
 
     Attributes

@@ -90,7 +90,7 @@ FINDINGS = ("choose", "diagnose", "laboratory", "extend", "report")
 
 
 def cost_s(stage: str, level: str, trials: int) -> float:
-    """About how long a unit, of a person with so many trials, takes beside others [s]."""
+    """About how long a unit, of a person with so many trials, takes compared with others [s]."""
     unit = f"{stage} {level}"
     costs = (s.costs_s for s in STAGES if (s.name, s.level) == (stage, level))
     return max(costs, default=_SHORT_S) * (trials if unit == "diagnose participant" else 1)
@@ -109,7 +109,7 @@ def by_level(stages: Iterable[Stage]) -> tuple[tuple[Stage, ...], tuple[Stage, .
 
 
 def in_turn(stages: Iterable[Stage]) -> Iterator[tuple[Stage, ...]]:
-    """Stages of each participant, then those of all, and so on: what is told of all serves each."""
+    """Stages of each participant, then those of all, and so on: what all show serves each."""
     for _, same in groupby(stages, key=lambda stage: stage.level == "cohort"):
         yield tuple(same)
 

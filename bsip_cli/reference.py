@@ -22,13 +22,14 @@ from pydantic.fields import FieldInfo
 from bsip_cli.cli import cli
 from bsip_cli.config import Config, Section, shipped
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.effect import Effect
 from bsip_cli.pipeline import STAGES, Stage
-from bsip_cli.report.effect_words import EFFECT_WORDS, USUAL, usual_words
-from bsip_cli.schemas import SCHEMAS, Column, Level, Schema
+from bsip_cli.report.effect_words import EFFECT_WORDS, FOLLOWS, usual_words
+from bsip_cli.schemas import SCHEMAS, Column, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"
 _COMMON = 3  # places that have the same column or option: it is explained once
-_NOTE = f"<!-- Made by `{REGENERATE}`; change the code instead. -->"
+_NOTE = "<!-- From bsip_cli/reference.py -->"
 
 
 def pages() -> dict[str, str]:
@@ -37,13 +38,14 @@ def pages() -> dict[str, str]:
         "cli.md": cli_page(),
         "options.md": options_page(),
         "artifacts.md": artifacts_page(),
-        "faults.md": faults_page(),
+        "faults/index.md": faults_page(),
+        **{f"faults/{effect.name}.md": fault_page(effect) for effect in CATALOGUE},
     }
 
 
 def write_pages(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in pages().items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
 
 
@@ -56,6 +58,17 @@ def _page(title: str, parts: Iterable[str]) -> str:
 
 def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
+
+
+def _runs(names: Sequence[str], order: Sequence[str]) -> str:
+    """Names in their order; neighbours in both are given by the first and the last."""
+    runs: list[list[str]] = []
+    for name in names:
+        follows = runs and order.index(name) == order.index(runs[-1][-1]) + 1
+        runs = [*runs[:-1], [*runs[-1], name]] if follows else [*runs, [name]]
+    return ", ".join(
+        f"`{run[0]}` to `{run[-1]}`" if len(run) >= _COMMON else _code(run) for run in runs
+    )
 
 
 # --- commands ---------------------------------------------------------------------------------
@@ -80,12 +93,17 @@ def cli_page() -> str:
         groups.setdefault((usage, *lines[name]), []).append(name)
     for (pieces, *options), names in groups.items():
         own = [line for line in options if line not in common]
-        shared = [line.split("`")[1].split()[0] for line in options if line in common]
+        shared = [_name(line) for line in options if line in common]
         parts += [f"## {', '.join(names)} {pieces.replace('[OPTIONS] ', '')}", *_meanings(names)]
         parts += ["Options:"] if own and len(names) > 1 else []
         parts += ["\n".join(own)] if own else []
-        parts += [f"{'And' if own else 'Options:'} {_code(shared)}."] if shared else []
+        said = f"{'And' if own else 'Options:'} {_runs(shared, [_name(line) for line in common])}."
+        parts += [said] if shared else []
     return _page("The command line", parts)
+
+
+def _name(line: str) -> str:
+    return line.split("`")[1].split()[0].rstrip(",")
 
 
 def _meanings(names: Sequence[str]) -> list[str]:
@@ -123,39 +141,42 @@ _RESULTS = Path(__file__).parents[1] / "docs" / "results"
 
 
 def faults_page() -> str:
-    """Every effect of the catalogue: what it is, how it shows, how large, how sure, what to do."""
+    """The faults by what follows from them, with what to do."""
     parts = [
-        "What `bsip diagnose` can name. *Usual* are the sizes that laboratories meet. *Sure*: how "
-        "often it was named, and how many 95 % intervals held the truth, where the blind suite had "
-        "hidden it ([all figures](results.md#is-the-right-fault-named)); without it, none was "
-        "hidden yet. *To tell it*: the recording that separates it from faults that look alike. "
-        "What it means for the results stands [at the end](#what-to-do), what else may be said in "
-        "[how to read the report](report.md)."
+        "What `bsip diagnose` can name, and what follows for the results. How sure: the [blind "
+        "suite](../results.md#is-the-right-fault-named) hid most of them twice; named in 2 of 2 "
+        "may still mean 34 %. Other answers: [how to read the report](../report.md)."
     ]
-    advice: dict[str, list[str]] = {}
+    families: dict[str, list[str]] = {}
     for effect in CATALOGUE:
         words = EFFECT_WORDS[effect.name]
-        what = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
-        parts += [f"## {effect.name}: {words.title}", what]
-        advice.setdefault(words.consequence, []).append(effect.name)
-        found = _found(effect.name)
-        lines = [
-            f"- Looks like: {effect.looks}.",
-            f"- Usual: {usual_words(effect.name)}." if effect.name in USUAL else "",
-            f"- Sure: {found}." if found else "",
-            f"- To tell it: {effect.remedy}.",
-        ]
-        parts.append("\n".join(filter(None, lines)))
-    consequences = [f"- {_code(names)}: {text}" for text, names in advice.items()]
-    return _page("The faults", [*parts, "## What to do", "\n".join(consequences)])
+        families.setdefault(words.family, []).append(f"- [{words.title}]({effect.name}.md)")
+    for family, lines in families.items():
+        parts += [f"## {family.capitalize()}", FOLLOWS[family].sentence, "\n".join(lines)]
+    return _page("The faults", parts)
+
+
+def fault_page(effect: Effect) -> str:
+    """What a fault is, how it shows, how large laboratories meet it, how sure bsip is, what to
+    record."""
+    words = EFFECT_WORDS[effect.name]
+    lines = [
+        f"- Looks like: {effect.looks}.",
+        f"- Usual size: {usual_words(effect.name)}.",
+        f"- How sure: {_found(effect.name)}.",
+        f"- To confirm: {effect.remedy}.",
+        f"- [What follows](index.md#{words.family})",
+    ]
+    what = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
+    return _page(f"{effect.name}: {words.title}", [what, "\n".join(lines)])
 
 
 def _found(effect: str) -> str:
-    """Of the blind suite's tables: cases, names, and intervals that hold the truth; or nothing."""
+    """Of the blind suite's tables: cases, names, and intervals that hold the truth."""
     with (_RESULTS / "blind_effects.csv").open(encoding="utf-8", newline="") as file:
         row = {one["hidden"]: one for one in csv.DictReader(file)}.get(effect)
     if row is None:
-        return ""
+        return "not known, never hidden in the suite"
     named, group = int(row["right name"]), int(row["right class"])
     said = f"named in {named} of {row['cases']}"
     said += f", in a group in {group}" if group else ""
@@ -164,7 +185,7 @@ def _found(effect: str) -> str:
         held = [one["95 % CI holds it"] for one in csv.DictReader(file) if one["effect"] == effect]
     counts = [tuple(map(int, text.split(" of "))) for text in held]
     inside, intervals = (sum(column) for column in zip(*counts, strict=True)) if counts else (0, 0)
-    return f"{said}, {inside} of {intervals} intervals" if intervals else said
+    return f"{said}; {inside} of {intervals} intervals right" if intervals else said
 
 
 # --- options ----------------------------------------------------------------------------------
@@ -220,7 +241,8 @@ def options_page() -> str:
         lines = []
         for option in (one for one in options if one.section == section):
             limits = _limits(field_of(section, option.name))
-            value = f"`{option.default}` {option.unit}".strip() + f" ({limits})" * bool(limits)
+            unit = option.unit.removeprefix("1")
+            value = f"`{option.default}` {unit}".strip() + f" ({limits})" * bool(limits)
             lines.append(f"- `{option.name}` = {value}: {option.meaning}")
         names = [section] if section else [option.name for option in options if not option.section]
         readers = dict.fromkeys(s.name for s in STAGES if set(names) & set(s.options))
@@ -256,12 +278,6 @@ def _choices(annotation: Any) -> list[str]:
 
 # --- artifacts --------------------------------------------------------------------------------
 
-_PLACES: dict[Level, str] = {
-    "trial": "OUT/sub-XX/sub-XX_task-TASK_run-N_{kind}.parquet",
-    "participant": "OUT/sub-XX/sub-XX_{kind}.parquet",
-    "cohort": "OUT/group/group_{kind}.parquet",
-}
-
 
 def artifacts_page() -> str:
     """Every stage with what it reads and writes, and every column of what is written."""
@@ -269,26 +285,26 @@ def artifacts_page() -> str:
     common = tuple(column for column, n in seen.items() if n >= _COMMON)
     written = {kind for stage in STAGES for kind in stage.writes}
     parts = [
-        "Parquet files, one table each. A column's unit, frame and meaning stand in the file too, "
-        "and as JSON under the key `bsip` what made it: kind, version, stage, versions of the "
-        "libraries, SHA-256 of every input, options, warnings. `bsip info FILE` prints both. `*` "
-        "stands for a family of columns; files of a session begin with sub-XX_ses-SES.",
+        "Parquet files, one table each: OUT/sub-XX/sub-XX_KIND.parquet of a participant, "
+        "sub-XX_ses-SES_task-TASK_run-N_KIND.parquet of a trial (ses- only with sessions), "
+        "OUT/group/group_KIND.parquet of the cohort; KIND is the heading, where nothing else is "
+        "given. A column's unit, frame and meaning stand in the file too, and as JSON under the "
+        "key `bsip` what made it: kind, version, stage, versions of the libraries, SHA-256 of "
+        "every input, options, warnings. `bsip info FILE` prints both. `*`: a family of columns.",
         "## Columns of many artifacts",
         "Where a table below ends with some of these, it has them too.",
         _columns(common),
     ]
     shown: dict[tuple[Column, ...], str] = {}
     for stage in STAGES:
-        parts += [f"## {stage.label}", stage.summary, _facts(stage)]
+        is_new = stage.summary not in parts
+        parts += [f"## {stage.label}", *[stage.summary] * is_new, _facts(stage)]
         for kind in stage.writes:
-            schema = SCHEMAS[kind]
-            place = _PLACES[schema.level].format(kind=schema.file_name)
-            parts += _schema_parts(schema, place, common, shown)
-    parts += ["## Beside them"]
-    places = {"refusal": "OUT/sub-XX/…_refusal-STAGE.parquet"}
+            parts += _schema_parts(SCHEMAS[kind], SCHEMAS[kind].file, common, shown)
+    parts += ["## Made by no stage"]
     for kind in [kind for kind in SCHEMAS if kind not in written]:
-        place = places.get(kind) or _PLACES[SCHEMAS[kind].level].format(kind=kind)
-        parts += _schema_parts(SCHEMAS[kind], place, common, shown)
+        file = "refusal-STAGE" if kind == "refusal" else SCHEMAS[kind].file
+        parts += _schema_parts(SCHEMAS[kind], file, common, shown)
     return _page("The artifacts", parts)
 
 
@@ -307,13 +323,14 @@ def _links(kinds: Sequence[str]) -> str:
 
 def _schema_parts(
     schema: Schema,
-    place: str,
+    file: str,
     common: Sequence[Column],
     shown: dict[tuple[Column, ...], str],
 ) -> list[str]:
-    """Heading, place and columns; those that an earlier artifact has are not repeated."""
-    sentence = f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`."
-    parts = [f"### {schema.kind}", sentence]
+    """Heading, the file's KIND if it is another one, and columns; those that an earlier artifact
+    has are not repeated."""
+    sentence = f"{schema.meaning[0].upper()}{schema.meaning[1:]}."
+    parts = [f"### {schema.kind}", f"{sentence} KIND is `{file}`." if file else sentence]
     if schema.columns in shown:
         earlier = shown[schema.columns]
         return [*parts, f"Columns as in [{earlier}](#{earlier})."]
@@ -321,17 +338,19 @@ def _schema_parts(
     own = [column for column in schema.columns if column not in common]
     shared = [column.name for column in schema.columns if column in common]
     parts += [_columns(own)] if own else []
-    return [*parts, *([f"And {_code(shared)}."] if shared else [])]
+    return [*parts, *([f"And {_runs(shared, [one.name for one in common])}."] if shared else [])]
 
 
 def _columns(columns: Iterable[Column]) -> str:
     """A line per column; neighbours of one meaning share one."""
     lines = []
-    for same, group in groupby(columns, key=lambda c: (c.type, c.unit, c.frame, c.meaning)):
-        kind, unit, frame, meaning = same
-        number = unit if kind == "float" else f"{kind} {unit}".removesuffix(" 1").strip()
+    for same, group in groupby(columns, key=lambda c: (c.type, c.frame, c.meaning)):
+        kind, frame, meaning = same
+        alike = tuple(group)
+        units = " or ".join(dict.fromkeys(column.unit for column in alike))
+        number = units if kind == "float" else f"{kind} {units}".removesuffix(" 1").strip()
         of = ", ".join(filter(None, [number, frame]))
-        lines.append(f"- {_code(column.name for column in group)} ({of}): {meaning}")
+        lines.append(f"- {_code(column.name for column in alike)} ({of}): {meaning}")
     return "\n".join(lines)
 
 

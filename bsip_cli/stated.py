@@ -143,7 +143,7 @@ def _sum(parts: list[tuple[float, str]], quantity: Quantity) -> float | None:
 
 
 def is_usual_pair(mass_kg: float, height_m: float) -> bool:
-    """Whether the body-mass index is one that a unit may be told by."""
+    """Whether a unit may be recognised by this body-mass index."""
     return USUAL_BMI_KG_M2[0] <= mass_kg / height_m**2 <= USUAL_BMI_KG_M2[1]
 
 

@@ -37,7 +37,7 @@ class TableRow:
 
 @dataclass(frozen=True)
 class Regression:
-    """RM of one person, per segment with mass in its segment frame, and what was mended."""
+    """RM of one person, per segment with mass in its segment frame, and what was repaired."""
 
     inertias: tuple[Inertia, ...]
     notes: tuple[str, ...]

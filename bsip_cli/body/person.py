@@ -63,7 +63,7 @@ class Person:
         """(n,) segments whose motion no markers show.
 
         Held ones, and ends of limbs on spherical joints whose markers lie on a line through the
-        joint, as a hand with the styloids only: how it bends cannot be told.
+        joint, as a hand with the styloids only: how it bends cannot be known.
         """
         lost = np.array(self.held, dtype=bool)
         in_joint = self.markers_in_joint_m()

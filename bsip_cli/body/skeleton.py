@@ -131,7 +131,7 @@ class Skeleton:
 def named_file(folder: str, name: str, what: str) -> Path:
     """The shipped file of this name in a folder of configs, or the one at a path.
 
-    UsageError: there is no such file: the shipped names are told.
+    UsageError: there is no such file: the shipped names are listed.
     """
     file = Path(name) if name.endswith(".toml") else shipped(folder, f"{name}.toml")
     if not os.path.lexists(file):

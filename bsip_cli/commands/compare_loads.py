@@ -95,8 +95,8 @@ def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, No
 def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]:
     """The recordings with and without: those named, or of the others that move, by what they carry.
 
-    UsageError: no load is declared that tells them apart, a name fits no recording or both sets, or
-        the recordings of one set carry different loads.
+    UsageError: no load is declared that distinguishes them, a name fits no recording or both sets,
+        or the recordings of one set carry different loads.
     """
     ready = unit.trials("kinematics", "wrench")
     moving = [trial for trial in ready if trial.role != "static"]
@@ -155,7 +155,7 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
 
 
 def _check_apart(unit: Unit, heavy: list[Trial], plain: list[Trial]) -> None:
-    """No recording is in both sets, and a declared load tells them apart."""
+    """No recording is in both sets, and a declared load distinguishes them."""
     twice = [trial.stem for trial in heavy if trial in plain]
     if twice:
         raise UsageError(

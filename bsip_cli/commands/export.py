@@ -136,7 +136,7 @@ def _bids(unit: Unit, _: str) -> Texts:
 
 def _opensim(unit: Unit, model: str) -> Texts:
     """For the model in that file: motion where the markers determine it; loads in the longest time
-    in which the plates tell what acts on each foot, and on nothing else."""
+    in which the plates measure what acts on each foot, and on nothing else."""
     person = person_of(unit)
     trial, name = trial_of(unit, person), unit.name
     known = trial.determined
@@ -151,7 +151,7 @@ def _opensim(unit: Unit, model: str) -> Texts:
         told &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)
     found = max(runs(told), key=lambda run: run[1] - run[0], default=(0, 0))
     if found[1] - found[0] < 2:
-        return texts, "no loads: the plates do not tell what acts on each foot alone"
+        return texts, "no loads: the plates do not measure what acts on each foot alone"
     frames = slice(*found)
     times = trial.times_s[frames]
     acting = loads({foot: w[frames] for foot, w in wrenches.items()})

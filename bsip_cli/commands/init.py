@@ -347,7 +347,7 @@ def _told(plan: _Plan) -> Iterator[str]:
     if lacking:
         whose = "" if len(lacking) == len(plan.people) else f" of {listed(lacking)}"
         yield (
-            f"no file tells the sex{whose}: write M or F into participants.tsv, else the mean of "
+            f"no file states the sex{whose}: write M or F into participants.tsv, else the mean of "
             "both tables is used"
         )
     if plan.tables:

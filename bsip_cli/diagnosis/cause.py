@@ -63,7 +63,7 @@ def method_of(causes: Iterable[Cause]) -> str:
 
 @dataclass(frozen=True)
 class Blocks:
-    """The stretches of a trial that the diagnosis held out together.
+    """The intervals of a trial that the diagnosis held out together.
 
     first : number of the first, counted through all trials. start_s : where it begins.
     """

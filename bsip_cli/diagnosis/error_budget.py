@@ -74,7 +74,7 @@ class Line:
     and by how much the error is smaller on data held out; as parts of one.
 
     scale : how many times as large as usual; NaN where nothing is usual. alike : other terms from
-    which these recordings hardly tell it.
+    which these recordings hardly decide it.
     """
 
     term: str

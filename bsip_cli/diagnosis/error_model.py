@@ -83,7 +83,7 @@ class Laid:
 
 
 def laid_out(trials: Sequence[TrialErrors]) -> Laid:
-    """Columns that matter beside the noise; of unit variance before the data."""
+    """Columns that matter given the noise; of unit variance before the data."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
         for term in one.terms:

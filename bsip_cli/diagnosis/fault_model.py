@@ -148,7 +148,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The model beside some faults.
+    """The model given some faults.
 
     faults : with their values; ``starts``: first coefficient of each, behind the ordinary ones.
     pieces : of the trials. root, mean (K,), covariance (K, K) : of all coefficients.
@@ -210,9 +210,9 @@ def fitted(
     whole: bool = True,
     same_noise: bool = False,
 ) -> Fitted:
-    """Coefficients, scales and noise beside faults with the values that these have by now.
+    """Coefficients, scales and noise given faults with the values that these have by now.
 
-    start : a fit beside other faults to begin with. whole : until noise and scales are settled;
+    start : a fit with other faults to begin with. whole : until noise and scales converge;
     else the noise of trials alone whose faults are others, once. same_noise : that of ``start``.
     """
     rounds = _ROUNDS if whole else 1
@@ -306,7 +306,7 @@ class _Fitting:
         return Piece(size, recursion, used, white, right, white.T @ white, white.T @ right)
 
     def _solved(self, pieces: Sequence[Piece], whole: bool) -> Fitted:
-        """Coefficients and scales of the largest evidence beside given noise."""
+        """Coefficients and scales of the largest evidence for given noise."""
         gram, against = summed(pieces, self.count)
         for _ in range(_STEPS if whole else _FEW_STEPS):
             before = self.root.copy()

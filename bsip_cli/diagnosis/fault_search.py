@@ -264,7 +264,7 @@ def _chosen(
 
 
 def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
-    """The model with one more fault, sized beside the noise of a fit with the same others; None if
+    """The model with one more fault, sized given the noise of a fit with the same others; None if
     it is not possible."""
     one = sized(noise, refined(noise, one))
     if not one.is_possible(fit.session):

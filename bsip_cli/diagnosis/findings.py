@@ -38,7 +38,7 @@ class Number:
 class Finding:
     """A hypothesis and what is made of it.
 
-    trials : their names. class_id : of faults that cannot be told apart here; empty for one alone.
+    trials : their names. class_id : of faults that look alike here; empty for one alone.
     p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
     white residual on data held out, and its interval. scope : laboratory, person or trial.
     rms_change : root mean square of what it does to the component that it changes most [N, N m].
@@ -167,7 +167,7 @@ def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, .
 
 def interval_words(numbers: tuple[Number, ...]) -> str:
     """Of the surest size, with the digits that its interval deserves; a size is neither a moment
-    nor a part of another one, if anything else is told."""
+    nor a part of another one, if anything else is reported."""
     names = {one.name for one in numbers}
     parts = {f"{name}_{axis}" for name in names for axis in "xyz"}
     sizes = [one for one in numbers if one.name not in _MOMENTS | parts] or numbers

@@ -1,4 +1,4 @@
-"""Faults over stretches of time: what one is worth where it did not help to find its size, and
+"""Faults over intervals of time: what one is worth where it did not help to find its size, and
 whether it is of one size throughout."""
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault diffe
 
 
 class Uneven(Nameless):
-    """Like another effect, but of another size in every stretch of time."""
+    """Like another effect, but of another size in every interval of time."""
 
     of_the_lab = False
 

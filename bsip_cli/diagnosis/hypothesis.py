@@ -116,6 +116,6 @@ class Hypothesis:
         return self.effect.sentence(self.scene(session), self.target, self.values)
 
     def alike(self, session: Trials) -> list[Hypothesis]:
-        """Those that these recordings cannot tell from it, the plainest first."""
+        """Those that these recordings cannot distinguish from it, the plainest first."""
         values = self.effect.alike(self.scene(session), self.target, self.values)
         return [replace(self, values=one) for one in values]

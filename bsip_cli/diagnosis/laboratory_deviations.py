@@ -31,7 +31,7 @@ class Deviation:
     """A cause that some sessions have on top of what their laboratory has.
 
     sessions : their numbers among the laboratory's; one, or all from one on. class_id : of causes
-    that cannot be told apart; empty for one alone.
+    that cannot be distinguished; empty for one alone.
     """
 
     sessions: tuple[int, ...]

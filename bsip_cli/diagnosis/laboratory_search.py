@@ -69,7 +69,7 @@ class Size:
 class Verdict:
     """What is made of a cause, given the others that are there.
 
-    said : named; ambiguous: it is one of those of its ``class_id``, which cannot be told apart;
+    said : named; ambiguous: it is one of those of its ``class_id``, which cannot be distinguished;
     rejected; or inconclusive: even ten times what laboratories meet would not have been named.
     probability : that it is there, and not another one in its place.
     """
@@ -196,7 +196,7 @@ class Laboratory:
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
-    """Fit the deviations beside any fault, and then look for what is there."""
+    """Fit the deviations jointly with any fault, and then look for what is there."""
     scale = scales_of(persons)
     log_prior = log_prior_of(causes, prior_odds)
     sums = sums_of(persons, scale)

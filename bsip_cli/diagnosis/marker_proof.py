@@ -45,7 +45,7 @@ BEND, SOFT_TISSUE = "missing_joint", "soft_tissue"
 @dataclass(frozen=True)
 class Slip:
     """A marker off its place from a moment on, before the trial for throughout; unlikeliness in
-    standard deviations; how far off it must be, once nothing else bends the pose, to be told."""
+    standard deviations; how far off it must be, once nothing else bends the pose, to count."""
 
     marker: str
     start_s: float
@@ -162,7 +162,7 @@ def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding
     target = person.skeleton.segments[max(on, key=on.count)]
     said = (
         f"soft tissue moves {len(shaken)} markers ({', '.join(one.target for one in shaken)}) by "
-        f"{min(sizes):.0f} to {max(sizes):.0f} mm from "
+        f"{' to '.join(dict.fromkeys(f'{one:.0f}' for one in (min(sizes), max(sizes))))} mm from "
         f"{min(float(one.values[3]) for one in shaken):.2f} s on"
     )
     p_value = max(one.p_value for one in shaken)
@@ -174,7 +174,7 @@ def bend_of(
     scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
     """A second bend of the trunk or soft tissue that moves with it, which markers do not tell
-    apart, where that is much of their residuals beside slips; nothing where it is little."""
+    apart, where that is much of their residuals given slips; nothing where it is little."""
     fewer = every(scene, ENOUGH_HZ)
     left = fewer.residual_m
     if left is None:

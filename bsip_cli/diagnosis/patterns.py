@@ -26,7 +26,7 @@ _LARGE, _SMALL = {"N": 40.0, "N m": 20.0}, {"N": 10.0, "N m": 5.0}
 
 
 class Nameless(Effect):
-    """Something is wrong, and nobody knows what."""
+    """An error of unknown cause."""
 
     name = UNEXPLAINED
     of_the_lab = True

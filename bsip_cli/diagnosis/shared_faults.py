@@ -1,4 +1,4 @@
-"""What one person's recordings tell of the faults that they share with others.
+"""What one person's recordings say of the faults that they share with others.
 
 The plates, the clock and the vertical belong to a laboratory, body and skin to a person. Of the
 person's equations only those of the shared faults are kept: of the white normal equations

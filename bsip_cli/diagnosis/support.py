@@ -3,7 +3,7 @@ that do not carry the stated mass.
 
 Of hands two things must come together. A hand stands still in the room while the trunk moves; and
 the plates miss a mean force that nothing inside a body can make: over a trial the mean horizontal
-force is the change of momentum by time, the mean vertical one the weight beside it. What the hand
+force is the change of momentum by time, the mean vertical one the weight as well. What the hand
 bears from one moment to the next no instrument shows, so nothing else is asked of such a trial: the
 swings of that force would be taken for other causes.
 """
@@ -92,7 +92,7 @@ class Support:
 
 def support_of(scene: Scene) -> Support | None:
     """What the hands hold on to throughout a trial; None if they hold on to nothing, or if its
-    measured part is too short to tell."""
+    measured part is too short to decide."""
     if scene.valid.sum() < SHORTEST_S * scene.rate_hz:
         return None
     paths = {name: _path_m(scene, name) for name in HANDS if name in scene.bodies}
@@ -223,7 +223,7 @@ def stated_mass_findings(
     """The class of causes if the plates differ from the stated mass by more than a scale does.
 
     share : of the stated mass, from ``weight_share`` or ``agreed_share``. mass_sd : its standard
-    deviation, part of it. plate : from ``loaded_plate``. trials : the recordings that tell.
+    deviation, part of it. plate : from ``loaded_plate``. trials : the recordings that show it.
     manner : how they were read, in words.
     """
     if not is_noticed(share, mass_sd):

@@ -1,4 +1,4 @@
-"""One linear low-pass for both sides of the equations, confined to stretches of valid frames."""
+"""One linear low-pass for both sides of the equations, confined to intervals of valid frames."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def stride_to(rate_hz: float, enough_hz: float) -> int:
 def lowpass_operator(
     valid: np.ndarray, rate_hz: float, cutoff_hz: float, stride: int = 1
 ) -> tuple[sparse.csr_array, np.ndarray]:
-    """Gaussian zero-phase low-pass that never reaches beyond a stretch of valid frames.
+    """Gaussian zero-phase low-pass that never reaches beyond an interval of valid frames.
 
-    Near the end of a stretch the kernel is cut and normalised. The operator is the same for any
+    Near the end of an interval the kernel is cut and normalised. The operator is the same for any
     signal, so both sides of a linear equation stay comparable (design: like with like).
 
     Parameters

@@ -20,7 +20,7 @@ from bsip_cli.segments import in_words
 
 class StatedMass(Effect):
     """A person heavier or lighter than is stated, every segment alike: what a laboratory's plates
-    must not be blamed for. No part of the catalogue: within one person it cannot be told from a
+    must not be blamed for. No part of the catalogue: within one person it looks like a
     gain of all plates."""
 
     name = "stated_mass"
@@ -155,7 +155,7 @@ class WobblingMass(Effect):
 
     Looked for only where an impact sets it swinging: in slow movement it is a heavier segment. It
     need not swing to the sides as it does up and down: how much of it seems to is a number of its
-    own, which is not told.
+    own, which is not reported.
     """
 
     name = "wobbling_mass"
@@ -299,5 +299,5 @@ class Breathing(Effect):
 
 
 def _slowest_hz(scene: Scene) -> float:
-    """A few breaths are needed to tell them from any other slow course."""
+    """A few breaths are needed to distinguish them from any other slow signal."""
     return max(SLOWEST_HZ, LEAST_BREATHS / max(float(np.ptp(scene.times_s)), 1.0))

@@ -27,7 +27,7 @@ class Parameter:
         time); empty for a parameter that is zero where the effect is absent.
     known_to : standard deviation that no recording betters, since the truth is less simple than
         the effect's model: nobody leans on a rail along a ramp.
-    is_given : it keeps the value that is tried: the data do not tell it.
+    is_given : it keeps the value that is tried: the data do not decide it.
     """
 
     name: str
@@ -107,7 +107,7 @@ class Effect(ABC):
         return np.array([not p.scan for p in self.parameters(scene, target)])
 
     def is_told(self, scene: Scene, target: str) -> np.ndarray:
-        """(k,) True for the parameters without a scan of which the motion can tell anything."""
+        """(k,) True for the parameters without a scan of which the motion can decide anything."""
         return np.ones(int(self.is_free(scene, target).sum()), dtype=bool)
 
     def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What the person carries, and what holds or touches them beside the plates."""
+"""What the person carries, and what holds or touches them off the plates."""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ class Implement(Effect):
                 yield arm, 2 * np.pi * k / count - np.pi, elevation, EVEN_ROD
 
     def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        """The shape is not sought: the plates do not tell it."""
+        """The shape is not sought: the plates do not show it."""
         return super().spacing(scene, target, values) * [1.0, 1.0, 1.0, 0.0]
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -369,7 +369,7 @@ def estimate(problem: Problem) -> Estimate:
         f"{centres:.2f}, inertias {min(tensors):.2f} to {max(tensors):.2f}"
     )
     if fit.decided < _LITTLE:
-        note += "; too little motion, or errors that hide what it tells"
+        note += "; too little motion, or errors that hide what it shows"
     return Estimate(
         terms.table + shown @ fit.optimum.x,
         shown @ fit.optimum.covariance @ shown.T,

@@ -18,7 +18,7 @@ class Problem:
 
     The next three are options of [identify]: how many times worse the data are than they look; the
     sigma% below which a base parameter counts; and how many deviations as large as [prior] says
-    count beside this person's own. ``whole``: the equations before the wrench of segments that keep
+    count with this person's own. ``whole``: the equations before the wrench of segments that keep
     the table's values was taken off; None where no segment does. ``beside``: the equations with the
     instruments' columns after the parameters.
     """

@@ -1,6 +1,6 @@
 """Estimator ``mass_factor`` (RM+mass): the table's body, all masses and tensors times one number.
 
-What the plates say of the whole mass and no more. OM is compared with it beside RM: an error that
+What the plates say of the whole mass and no more. OM is compared with it and with RM: an error that
 one number removes is no gain of identification.
 """
 

@@ -1,4 +1,4 @@
-"""What ten more seconds of each movement would tell about this person, beside what is known."""
+"""What ten more seconds of each movement would add to what is known about this person."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Swing:
 
 @dataclass(frozen=True)
 class Movement:
-    """A movement from standing: what people are told, the foot that stays, and the joints."""
+    """A movement from standing: the instruction, the foot that stays, and the joints."""
 
     name: str
     text: str
@@ -180,7 +180,7 @@ class Gain:
 class Advice:
     """Every possible movement on its own, best first, and the few that help most together.
 
-    A gain in ``together`` counts what the movements before it in the tuple already tell: the
+    A gain in ``together`` counts what the movements before it in the tuple already decide: the
     second best on its own is often the first one's twin.
     """
 
@@ -189,7 +189,7 @@ class Advice:
 
 
 def advice(problem: Problem, person: Person, model: pin.Model) -> Advice:
-    """Gains over what the recordings of the problem tell, at their noise.
+    """Gains over what the recordings of the problem decide, at their noise.
 
     A second of movement is taken to hold as many independent samples as one of the recordings'.
     """

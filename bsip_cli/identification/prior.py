@@ -55,7 +55,7 @@ class Prior:
         masses is known: ten per segment, in the order of :meth:`Inertia.readable`.
     pairs : the segments whose parameters go together: both sides, or one of the midline.
     fixed : (n,) segments that keep the table's values, as those do whose motion no markers show;
-        the scale tells about the others.
+        the scale says about the others.
     origin_sd_m : how far the segments' origins lie off the anatomical ones, in each direction: part
         of ``root``, since the model's body is seen from there, and of what people read.
     """

@@ -135,8 +135,8 @@ class ReadableParameters:
 def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
     """Linearised about the estimate for the sd, about the prior for the share.
 
-    The forces tell where a centre of mass lies from the model's origin; how far that lies from the
-    anatomical one is left, whatever they tell.
+    The forces show where a centre of mass lies from the model's origin; how far that lies from the
+    anatomical one is left, whatever they show.
     """
     n = len(prior.inertias)
     values, sd, share = (np.empty((n, 10)) for _ in range(3))

@@ -19,7 +19,7 @@ offset
     The median residual of the whole trial is far beyond the spread and that of the others.
 
 A marker that slips or sits wrong drags the pose, and its neighbours' residuals with it. The
-linear response of the fit tells which marker explains the residuals of all; only that one is
+linear response of the fit shows which marker explains the residuals of all; only that one is
 reported, with the distance it moved by on its segment and not the smaller residual it leaves.
 """
 
@@ -69,7 +69,7 @@ _FRAMES = 24
 
 
 def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
-    """Labels of the limbs put right, with the events.
+    """Labels of the limbs corrected, with the events.
 
     All markers of one limb pull the other limb's model over, or turn the trunk round, so single
     pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames

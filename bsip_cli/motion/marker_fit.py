@@ -1,4 +1,4 @@
-"""One trial's markers beside the fitted model: what the search for bad markers reads."""
+"""One trial's markers against the fitted model: what the search for bad markers reads."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def marker_fit(
     marker_sd_m: float,
     robust_limit_m: float,
 ) -> MarkerFit:
-    """Lay fitted poses q (N, nq) beside the markers (N, m, 3) in the order of the person's.
+    """Compare fitted poses q (N, nq) with the markers (N, m, 3) in the order of the person's.
 
     ``marker_sd_m`` and ``robust_limit_m`` are those of the inverse kinematics.
     """

@@ -58,7 +58,7 @@ class SmoothSignal:
 
 @dataclass(frozen=True)
 class SkinNoise:
-    """Noise that falls with frequency, beside the white one.
+    """Noise that falls with frequency, on top of the white one.
 
     Below ``corner_hz`` its power, mean over the trial, is larger than that of the white noise;
     below ``from_hz`` it is never taken to be larger than the signal's.
@@ -88,7 +88,7 @@ def smooth(
     samples : (N, channels); NaN where missing, which is bridged, each channel on its own.
     window_s : time over which the pace of the motion is judged.
     noise_sd : (channels,) white noise of the samples, estimated from them where not given.
-    skin : coloured noise beside it; none where not given.
+    skin : coloured noise on top of it; none where not given.
 
     ValueError: there are fewer than 12 samples, or a channel has none.
     """

@@ -256,3 +256,22 @@ def _tied(text: str) -> str:
 
 def _svg_source(svg: bytes) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
+
+
+_GLOSSARY = (
+    ("COP", "Centre of pressure: where on the plate the ground force acts."),
+    ("RM", "Regression method: segment parameters from an anthropometric table."),
+    ("RM+mass", "RM, all masses and tensors times one number, so that the plates' weight fits."),
+    ("OM", "Optimisation method: parameters identified from this person's movement and forces."),
+    ("OM+causes", "OM identified again with every named fault in the model."),
+    ("Segment parameters", "Mass, centre of mass and moments of inertia of a body segment."),
+    ("Data decide", "Part of the table's uncertainty that the recordings removed; 0: the table."),
+    ("Error budget", "What makes the squared difference of simulated and measured forces."),
+    ("Held out", "Data that identified nothing, on which methods are compared."),
+    ("Probability", "That a fault is there, given all else that was found."),
+    ("95 % interval", "Holds the true value in 95 of 100 such recordings."),
+    ("sd", "Standard deviation."),
+    ("BW", "Body weight."),
+)
+WORDS = Section("words", "What do the words mean?", (Terms(_GLOSSARY),))
+"""The glossary of every report."""

@@ -97,7 +97,7 @@ class Candidate:
 
     @property
     def is_of_all(self) -> bool:
-        """The laboratory's, as all its persons together tell it."""
+        """The laboratory's, as all its persons together show it."""
         return _OF_ALL in self.sentence
 
     def what(self) -> str:
@@ -263,7 +263,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
 
 
 def analysed(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
-    """Stems of the recordings that were diagnosed, those of which something was told before the
+    """Stems of the recordings that were diagnosed, those of which something was found before the
     search too."""
     told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]
     return tuple(sorted({s for t in (*detection["trials"], *told) for s in str(t).split(", ")}))

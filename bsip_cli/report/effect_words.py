@@ -24,22 +24,32 @@ WEIGHT = (
 
 
 @dataclass(frozen=True)
-class EffectWords:
-    """``title``: the cause in general; ``meaning``: what it does to the results; ``action``: what to
-    do."""
+class Consequence:
+    """What causes of a kind do to the results (``meaning``), and what to do (``action``)."""
 
-    title: str
     meaning: str
     action: str
 
     @property
-    def consequence(self) -> str:
+    def sentence(self) -> str:
         return f"{self.meaning} {self.action}"
 
 
+@dataclass(frozen=True)
+class EffectWords:
+    """``title``: the cause in general; ``family``: the key of what follows from it."""
+
+    title: str
+    family: str
+
+    @property
+    def follows(self) -> Consequence:
+        return FOLLOWS[self.family]
+
+
+FOLLOWS = {family: Consequence(**words) for family, words in _WORDS["follows"].items()}
 EFFECT_WORDS = {
-    name: EffectWords(about["title"], **_WORDS["follows"][about["follows"]])
-    for name, about in _WORDS["causes"].items()
+    name: EffectWords(about["title"], about["follows"]) for name, about in _WORDS["causes"].items()
 }
 MAIN_NUMBERS = {
     name: tuple(about["about"]) for name, about in _WORDS["causes"].items() if "about" in about
@@ -69,10 +79,9 @@ def place_label(effect: str, target: str) -> str:
     if effect.startswith("marker_"):
         first, _, second = target.partition("+")
         return f"markers {first} and {second}" if second else f"marker {target}"
-    if effect == "joint_centre" or target in SEGMENTS:
-        return segment_label(target)
-    if effect == "unmeasured_contact":
-        return " and ".join(segment_label(name) for name in target.split("+"))
+    parts = target.split("+")
+    if effect == "joint_centre" or all(part in SEGMENTS for part in parts):
+        return " and ".join(segment_label(part) for part in parts)
     return _WORDS["channels"].get(target, target)
 
 
@@ -123,7 +132,9 @@ USUAL = {
 
 
 def usual_words(effect: str) -> str:
-    """``5 to 20 ms``."""
+    """``5 to 20 ms``; in the words of the file where it is no size of a parameter."""
+    if effect not in USUAL:
+        return str(_WORDS["causes"][effect]["met"])
     usual = USUAL[effect]
     factor, unit = readable_unit(usual.parameters[0], usual.unit)
     return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
@@ -138,7 +149,7 @@ _UNKNOWN = "look at plates, cables and everything that touches the person, and r
 
 
 def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
-    """What to record, without a final stop, for rivals as (effect, target); at most so many steps."""
+    """What to record, without a final stop, for causes that look alike, as (effect, target); at most so many steps."""
     effects = list(dict.fromkeys(effect for effect, _ in rivals))
     places = {one: {target for effect, target in rivals if effect == one} for one in effects}
     advice = [_places(effect, rivals) for effect in effects if len(places[effect]) > 1]

@@ -1,5 +1,5 @@
 """Errors of the methods: what identification gains over the table's parameters, and over these times
-one number; how large they are beside yardsticks; what makes them."""
+one number; how large they are against yardsticks; what makes them."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def _compared(first: pd.Series) -> str:
         said = f"{om} than {table}, {over_scaled} than {times}"
     if first["use"] == OM:
         return f": {where}it errs {said}"
-    return f": OM (identified) is no sure gain; {where}it errs {said}"
+    return f": OM (identified) is not clearly better; {where}it errs {said}"
 
 
 def _change(ratio: float, log_error: float) -> str:
@@ -285,7 +285,7 @@ LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 @dataclass(frozen=True)
 class Piece:
-    """What some terms, told together where they look alike, make of an error [%]."""
+    """What some terms, taken together where they look alike, make of an error [%]."""
 
     label: str
     share: float

@@ -111,7 +111,7 @@ class ParticipantRecord:
         return tuple(trial for trial in self.trials if trial.stem in named)
 
     def moving_trials(self) -> tuple[TrialRecord, ...]:
-        """Those in which somebody moves: standing still tells no method apart."""
+        """Those in which somebody moves: quiet stance distinguishes no methods."""
         return tuple(trial for trial in self.trials if trial.role != "static")
 
     def use(self) -> str:

@@ -48,6 +48,7 @@ from bsip_cli.report.words import (
     segment_label,
     signed,
     trial_label,
+    with_article,
 )
 from bsip_cli.statistics.methods import OM, RM
 
@@ -170,16 +171,17 @@ def light_of(
 
 
 def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
-    """``2 faults and 1 error of unknown cause found``; empty where nothing but a large error was.
-    What a task may be about is no fault."""
+    """``2 faults and 1 error of unknown cause found; a club, racket or stick in the hand``; empty
+    where nothing but a large error was. What a task may be about is no fault."""
     found = [cause for cause in causes if not is_large(cause)]
     objects = [c for c in found if all(one.effect in OBJECTS for one in c)]
     unnamed = [c for c in found if len(c) == 1 and c[0].effect == UNNAMED]
     faults = len(found) - len(objects) - len(unnamed)
     parts = [count(faults, "fault")] if faults else []
     parts += [f"{count(len(unnamed), 'error')} of unknown cause"] if unnamed else []
-    parts += dict.fromkeys(effect_title(one.effect) for c in objects for one in c)
-    return f"{listing(parts)} found" if parts else ""
+    named = dict.fromkeys(with_article(effect_title(one.effect)) for c in objects for one in c)
+    found_here = f"{listing(parts)} found" if parts else ""
+    return "; ".join(filter(None, (found_here, listing([*named], ""))))
 
 
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
@@ -190,13 +192,13 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
     if most is None or most.label in (UNKNOWN, REST):
         return f", {CAUSE_UNKNOWN}"
     if use == OM and PARAMETERS in most.label:
-        return " also with identified parameters"
+        return " even with identified parameters"
     how = "most" if most.share > 50.0 else "the largest part"
     return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
-    """What, how large beside what laboratories meet, where and how sure, as short as possible."""
+    """What, how large compared with what laboratories meet, where and how sure, as short as possible."""
     sure = probability_words(probability_of(cause))
     if len(cause) > 1:
         return _group_line(cause, sure)
@@ -411,7 +413,7 @@ def consequences(
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
-    known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
+    known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
     lab = ((_OF_THE_LAB, ""),) if all(one.scope == "laboratory" for one in cause) else ()
     return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 

@@ -14,7 +14,7 @@ from bsip_cli.running.unit import Unit, code_hash
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant
 
-_MOVED = "what all persons together tell has moved"
+_MOVED = "what all persons together show has moved"
 
 
 def why_stale(unit: Unit) -> str:
@@ -148,7 +148,7 @@ def _changed(unit: Unit, kind: str) -> list[str]:
 
 
 def outdated(path: Path) -> str:
-    """Why an artifact is no more true as far as the folder of results tells, without the study.
+    """Why an artifact is no more true as far as the folder of results shows, without the study.
 
     Its code has changed, or an artifact that it was made from, or one that that was made from.
 

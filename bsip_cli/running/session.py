@@ -1,4 +1,4 @@
-"""One call of a stage command: load the study, run, tell the user, decide the exit code."""
+"""One call of a stage command: load the study, run, report to the user, decide the exit code."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def follow(
     verbose: bool = False,
     quiet: bool = False,
 ) -> int:
-    """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code.
+    """Report to the user what becomes of the units, with a bar of ``total`` steps; the exit code.
 
     ``cost``: how many steps a unit is; what need not be done takes its steps from the total, so
     that the time left is that of what is done. ``out``: the results' folder, None if they are not

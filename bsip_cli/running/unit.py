@@ -37,7 +37,7 @@ class Unit:
     """What a stage is handed: it reads, writes and warns through this and nothing else.
 
     ``config`` are the options that the stage names. ``left_out`` are participants whose results are
-    not up to date, with the reason: a cohort stage tells of them and does not use them.
+    not up to date, with the reason: a cohort stage reports them and does not use them.
     ``recordings`` are opened already, by their trials' stems; others are opened from their files.
     """
 

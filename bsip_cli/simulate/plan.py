@@ -337,7 +337,7 @@ def other_side(side: str) -> str:
 def moved_a_little(
     sketch: Sketch, rng: np.random.Generator, breath_deg: float, sway: float = 1.0
 ) -> None:
-    """Add a breath of motion and sway: nobody stands like a statue."""
+    """Add a breath of motion and sway: nobody stands quite still."""
     add_breath_of_motion(sketch, rng, np.deg2rad(breath_deg))
     add_sway(sketch, rng, sway)
 

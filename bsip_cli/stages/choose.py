@@ -43,7 +43,7 @@ _DECIDING = {OM: PAIRS[:2], RM_MASS: (PAIRS[2], PAIRS[1]), RM: PAIRS}
 @dataclass(frozen=True)
 class Judge:
     """A trial that may judge: its mean logarithm of the error, and the RMSE of its ground force, by
-    method; what it tells alone."""
+    method; what it shows alone."""
 
     trial: Trial
     log_error: dict[str, float]

@@ -93,7 +93,7 @@ def run(unit: Unit) -> None:
 def _searched(
     unit: Unit, trials: Sequence[Diagnosed], known: Known | None
 ) -> tuple[Found, Library, HeldOut]:
-    """Faults that the forces show, beside what the markers prove and other persons tell."""
+    """Faults that the forces show, given what the markers prove and other persons show."""
     options = unit.config.diagnosis
     told = [
         x.for_faults if known is None else known.beside(x.for_faults, not x.moves) for x in trials
@@ -112,7 +112,7 @@ def _of_markers(
     findings: Sequence[Finding],
     rng: np.random.Generator,
 ) -> Iterator[Finding]:
-    """What markers prove; and a bend of the trunk, where the forces have not told it already."""
+    """What markers prove; and a bend of the trunk, where the forces have not shown it already."""
     bent = {t for f in findings if f.effect == BEND and f.verdict != "rejected" for t in f.trials}
     number = 0
     for k, one in enumerate(trials, start=1):
@@ -127,7 +127,7 @@ def _of_markers(
 
 
 def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
-    """Large errors, less the trials of which it is told already that something has no name."""
+    """Large errors, less the trials already reported with an error of unknown cause."""
     told = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
     for one in large:
         if trials := tuple(t for t in one.trials if t not in told):

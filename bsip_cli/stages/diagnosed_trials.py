@@ -85,7 +85,7 @@ class Weighed:
     """All trials with forces, of a body as heavy as is believed.
 
     prior : of its parameters. share : part of the stated mass by which the plates read more, where
-    they are believed instead; findings : what is told of that.
+    they are believed instead; findings : what is reported of that.
     """
 
     scenes: tuple[tuple[Trial, Scene], ...]
@@ -124,7 +124,7 @@ def prior_of(
     unit: Unit, person: Person, share: float | None = None, whatever_mass: bool = False
 ) -> Prior:
     """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
-    that a scale has told.
+    that a scale has measured.
 
     share : by what part of the stated mass the plates read more, where they are believed instead.
     whatever_mass : how the stated mass is shared out alone, whatever it is.
@@ -203,7 +203,7 @@ def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator
 
 
 def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
-    """A constant force on each hand, of the size from which on it is told."""
+    """A constant force on each hand, of the size from which on it is reported."""
     force = LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
     for hand in HANDS:
         place = scene.point(hand, scene.centre_of(hand)).position_m

@@ -211,7 +211,7 @@ def run_trial(unit: Unit) -> None:
 def _scene(
     unit: Unit, person: Person, extended: pd.DataFrame
 ) -> tuple[Scene, dict[str, np.ndarray]]:
-    """The trial with the body beside which the causes were sized; parameters (10 n,) of OM and of
+    """The trial with the body for which the causes were sized; parameters (10 n,) of OM and of
     each extended model, loads included."""
     methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
     scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index(RM)]))

@@ -71,7 +71,7 @@ def recordings_of(
     trials: Iterable[Trial],
     changes: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[list[Recording], pd.DataFrame]:
-    """Motion and the wrench of the person alone, and the stretches that may identify.
+    """Motion and the wrench of the person alone, and the intervals that may identify.
 
     changes : of a trial's stem, the part (N, 6) of its measured wrench that is not the person's.
     """

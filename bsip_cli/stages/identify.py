@@ -117,7 +117,7 @@ def _write_table_only(
 
 
 def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, Support]:
-    """What bears part of the body beside the plates, by trial; phi (10 n,) of the table."""
+    """What bears part of the body off the plates, by trial; phi (10 n,) of the table."""
     found = {}
     for trial in unit.trials("kinematics", "wrench"):
         scene = slow(motion_and_wrench_of(unit, person, phi, trial))

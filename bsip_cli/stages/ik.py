@@ -71,7 +71,7 @@ def _determined(
     """Joints (N, joints) whose angles the markers decide in a frame as they do in most others.
 
     A joint beyond an undecided one is undecided too. Also the largest standard deviation (N,) of
-    an angle that most frames decide. The user is told what markers do not decide.
+    an angle that most frames decide. The user is informed of what markers do not decide.
     """
     skeleton = person.skeleton
     if not decided.all():
@@ -106,7 +106,7 @@ def _evidence(
     times: np.ndarray,
     poses: Poses,
 ) -> Evidence:
-    """Markers that jump, slip, bear another's label or sit wrong; the user is told the worst."""
+    """Markers that jump, slip, bear another's label or sit wrong; the worst are reported."""
     scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
 
     def refit(other: np.ndarray, at: np.ndarray) -> MarkerFit:

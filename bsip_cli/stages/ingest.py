@@ -110,7 +110,7 @@ def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
 
 
 def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:
-    """The set that is configured, or told from the labels, and how."""
+    """The set that is configured, or recognised from the labels, and how."""
     if unit.config.marker_set != "auto":
         return load_marker_set(unit.config.marker_set), ()
     source = quote(str(unit.own_trial.path))
@@ -152,7 +152,7 @@ def _contacts(
     loads: tuple[PlateLoad, ...],
     stated: StatedMass | None,
 ) -> tuple[ContactWindows, tuple[Stretch, ...], list[Finding]]:
-    """When what is on the plates, the stretches that tell the mass, and what is said of that;
+    """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
@@ -176,11 +176,11 @@ def _contacts(
 def _mass_on_plates(
     unit: Unit, stated: StatedMass | None, stretches: tuple[Stretch, ...]
 ) -> tuple[float | None, float | None, list[Finding]]:
-    """The mass [kg] on the plates, known loads included, what the trial's plates tell for sure, and
+    """The mass [kg] on the plates, known loads included, what the trial's plates show for sure, and
     what is said of both.
 
-    The stated one, unless the trial's plates tell for sure a grossly different one; without a
-    stated mass what they tell for sure; else None.
+    The stated one, unless the trial's plates surely show a grossly different one; without a
+    stated mass what they surely show; else None.
     """
     options = unit.config.ingest
     height_m = unit.person.height_m if stated is None else None

@@ -49,7 +49,7 @@ _POSES = 40  # in which the response to accelerations is computed; between them 
 _WEAK_PRIOR = 200.0  # rad/m, as in smoothing: an angle that errs by more is held by the prior
 _HELD = "something that no plate measures may bear the person"
 Reasons = dict[str, np.ndarray]  # in words: (N, J) frames and joints that it leaves out
-_SHARED = "nothing tells what each of two hands bears of one load"
+_SHARED = "nothing shows what each of two hands bears of one load"
 _NO_POSE = "the markers do not determine the pose"
 
 
@@ -79,7 +79,7 @@ def run(unit: Unit) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Motion, and plates beside the feet, of one trial; frames N."""
+    """Motion, and plates with the feet, of one trial; frames N."""
 
     person: Person
     times_s: np.ndarray

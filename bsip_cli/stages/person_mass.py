@@ -1,4 +1,4 @@
-"""The person's mass: stated, told by the plates of all trials, or not known."""
+"""The person's mass: stated, measured by the plates of all trials, or not known."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class StatedMass:
 
 @dataclass(frozen=True)
 class PersonMass:
-    """mass_kg (NaN if not known), its source, what the plates tell without known loads (NaN if
+    """mass_kg (NaN if not known), its source, what the plates show without known loads (NaN if
     nothing for sure), and a gross disagreement or what is missing in words."""
 
     mass_kg: float

@@ -122,7 +122,7 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
 
 
 def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
-    """As configured; what ingest told from the trial's labels where that was left to it."""
+    """As configured; what ingest recognised from the trial's labels where that was left to it."""
     configured = unit.config.marker_set
     if configured != "auto":
         return load_marker_set(configured)

@@ -83,7 +83,7 @@ def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:
 
 
 def plates_of(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
-    """Every plate that has a reading; where a file tells no place, about its mean load."""
+    """Every plate that has a reading; where a file states no place, about its mean load."""
     found = []
     for number in plate_names(wrench):
         reading = wrench[[f"plate{number}_{c}" for c in WRENCH]].to_numpy()
@@ -111,7 +111,7 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
 
 
 def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:
-    """(10 n,) the body beside which the causes were sized: RM's (10 n,), made as heavy as the
+    """(10 n,) the body for which the causes were sized: RM's (10 n,), made as heavy as the
     plates read where the diagnosis believes them instead of the stated mass."""
     return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])
 

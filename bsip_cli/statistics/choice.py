@@ -25,8 +25,8 @@ Pair = tuple[str, str]
 @dataclass(frozen=True)
 class Difference:
     """Of the logarithms of two methods' errors, and its standard error; that is widened by
-    Student's t where few trials or samples tell it, so that it always means the same confidence
-    (84 % to one side), and is nan where nothing tells it."""
+    Student's t where few trials or samples decide it, so that it always means the same confidence
+    (84 % to one side), and is nan where nothing decides it."""
 
     log: float
     error: float

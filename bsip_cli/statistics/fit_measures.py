@@ -105,7 +105,7 @@ class Posturography:
     """Sway measures of one signal; what cannot be computed is nan.
 
     rms_*_mm : root mean square about the mean, the usual definition of sway.
-    rms_*_origin_m : about the origin of the coordinates, which only tells where the person
+    rms_*_origin_m : about the origin of the coordinates, which only shows where the person
         stood; it is here because the printed values of Hansen 2017 fit it.
     duration_s : time between first and last sample, summed over the stretches.
     """

@@ -142,7 +142,7 @@ def _by(recordings: Iterable[Found], keys: Iterable[str]) -> dict[str, list[Foun
 
 
 def _person_folders(recordings: Sequence[Found]) -> list[str]:
-    """The folder that tells each recording's person; empty where folders only sort."""
+    """The folder that names each recording's person; empty where folders only sort."""
     telling = [
         [folder for folder in one.folders if not _SESSION.match(folder) and not _only_sorts(folder)]
         for one in recordings

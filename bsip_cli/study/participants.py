@@ -75,7 +75,7 @@ class Columns:
 
 
 def columns_in(header: Sequence[str]) -> list[Column]:
-    """All columns that are understood; the others are nobody's business."""
+    """All columns that are understood; the others are ignored."""
     return [column for k, title in enumerate(header) if (column := _column(k, title))]
 
 

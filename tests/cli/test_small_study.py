@@ -323,7 +323,7 @@ def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
         assert {f"{stem}_motion.mot" for stem in stems} < names
         assert {path for path in names if "osim" in path} == set(_models(first_run))
         # once, and once of the other recordings
-        assert answer.err.count("no loads: the plates do not tell what acts on each foot") == 2
+        assert answer.err.count("no loads: the plates do not measure what acts on each foot") == 2
         return
     assert names == {f"{stem}_joint-moments.csv" for stem in stems}
     for stem in stems:

@@ -171,7 +171,7 @@ def test_a_sound_laboratory_is_told_with_what_would_have_been_seen(reports):
 
 def test_one_person_is_no_laboratory(reports):
     text, rows = of_laboratory(reports, laboratory("named", 0.9999).assign(persons=1))
-    assert "is in the person's report" in text
+    assert "are in the person's report" in text
     assert "11 ms" not in text and not rows
 
 

@@ -51,8 +51,10 @@ def test_the_verdict_says_what_how_large_how_sure_and_where(found):
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
     )
-    assert text.count(EFFECT_WORDS["plate_rotation"].consequence) == 1  # plate_zero's is the same
-    assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
+    assert (
+        text.count(EFFECT_WORDS["plate_rotation"].follows.sentence) == 1
+    )  # plate_zero's is the same
+    assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].follows.sentence}" in text
     group = found.replace({"effect": {"added_mass": "plate_gain"}})
     assert "Findings 1 and 2: The measured forces" in text_of(group, detection(TRIALS))
     assert "Finding 1: It is a matter of the laboratory" in text  # the group may be the person's
@@ -195,6 +197,13 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     )
 
 
+def test_an_object_of_the_task_is_no_fault(found):
+    ball = found[found["rank"] == 1].assign(effect="released_object", class_id="", rank=9)
+    assert light_of(ball, detection(TRIALS)).title == "An object held and let go"
+    both = pd.concat([found, ball])
+    assert light_of(both, detection(TRIALS)).title == "2 faults found; an object held and let go"
+
+
 def test_something_that_cannot_be_named(found):
     row = found[found["effect"] == "plate_zero"].assign(
         effect=UNNAMED, verdict="named", class_id="", sentence="something goes along with fz"
@@ -202,7 +211,7 @@ def test_something_that_cannot_be_named(found):
     assert light_of(row, detection(TRIALS)).title == "1 error of unknown cause found"
     text = text_of(row, detection(TRIALS))
     assert "Something goes along with fz (95 % interval 8.8 to 10.8 N)" in text
-    assert EFFECT_WORDS[UNNAMED].consequence in text
+    assert EFFECT_WORDS[UNNAMED].follows.sentence in text
     assert "bsip extend" not in text  # what has no name cannot be put into a model
 
 
@@ -291,7 +300,7 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
     text = text_of(group, detection(TRIALS))
     assert "(b) soft tissue moves: its markers are 12 mm off, probability 38.0 %." in text
     assert text.count("a second bend and soft tissue") == 0 and text.count(remedy) == 1
-    assert EFFECT_WORDS[SOFT_TISSUE].consequence in text
+    assert EFFECT_WORDS[SOFT_TISSUE].follows.sentence in text
 
 
 def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
@@ -303,7 +312,7 @@ def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
     assert (
         "No known fault makes what the forces show: plate 1 is turned, but not evenly (95 %" in text
     )
-    assert EFFECT_WORDS[UNNAMED].consequence in text
+    assert EFFECT_WORDS[UNNAMED].follows.sentence in text
 
 
 # --- limits -------------------------------------------------------------------------------------

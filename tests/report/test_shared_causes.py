@@ -47,7 +47,7 @@ def test_a_cause_of_two_people_is_told_with_their_sizes():
     (said,) = shared(ann=turned_by(0.035), bob=NOTHING, eve=turned_by(0.04))
     assert said == (
         "Force plate turned or tilted: plate 1: in 2 of 3 participants (ann and eve), 2.0 to "
-        "2.3°; the sizes may all be the same."
+        "2.3°, equal within their intervals."
     )
 
 
@@ -62,7 +62,7 @@ def test_many_sizes_that_chance_spreads_may_be_the_same():
     people = {f"p{k}": turned_by(angle) for k, angle in enumerate(angles)}
     (said,) = shared(**people)
     assert angles.max() - angles.min() > 0.02  # so no value lies in all intervals
-    assert said.endswith("the sizes may all be the same.")
+    assert said.endswith(", equal within their intervals.")
 
 
 def test_sizes_without_intervals_are_not_compared():

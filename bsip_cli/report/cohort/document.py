@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import (
+    WORDS,
     Block,
     Bullets,
     Cell,
@@ -78,7 +79,7 @@ _FEWEST = 5  # persons among whom one can lie far out
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
         title="Cohort: do motion and measured forces agree?",
-        subtitle="Ground forces computed from the motion, against the plates'.",
+        subtitle="Ground forces measured by plates, against those computed from markers.",
         front=tuple(_front(record)),
         sections=(
             Section("people", "Who took part?", (_people(record),)),
@@ -89,6 +90,7 @@ def cohort_document(record: CohortRecord) -> Document:
             ),
             Section("tables", "The papers' tables", tuple(_tables(record))),
             Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
+            WORDS,
         ),
     )
 

@@ -16,16 +16,16 @@ from bsip_cli.report.verdict import probability_words
 from bsip_cli.report.words import MISSING, capital, listing, true_minus
 
 SAID = ("named", "ambiguous")
-_NOT_RUN = "Nobody asked for the faults of the laboratory: run `bsip laboratory`."
+_NOT_RUN = "The faults of the laboratory were not looked for: run `bsip laboratory`."
 _HEAD = ("fault", "where", "number", "estimate (95 % interval)", "seen from", "probability")
 _CAPTION = (
     "What was found, and of each other fault the likeliest place. Estimate: if the fault is there. "
     "Seen from: this size would be named in 95 of 100 laboratories with these recordings"
 )
-_ALONE = "Of one person what is wrong with the laboratory is in the person's report."
+_ALONE = "With one person, faults of the laboratory are in the person's report."
 _WHAT_TO_DO = (
-    "Check what is named on the spot, as its sentence says, before any number is corrected. What is "
-    "wrong in the same way with the model of every person here can look like a plate elsewhere."
+    "Check each fault in the laboratory, as its sentence says, before correcting anything. An error "
+    "of the model that all persons share can look like a fault of a plate."
 )
 
 
@@ -113,7 +113,7 @@ _TOLD = {
 
 
 def _limits(rows: pd.DataFrame) -> Iterator[str]:
-    """The smallest limit of each fault that is told in the sentence."""
+    """The smallest limit of each fault that the sentence mentions."""
     for (effect, parameter), words in _TOLD.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
         for best in mine.sort_values("limit").head(1).to_dict("records"):

@@ -167,7 +167,7 @@ def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]
 
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
-    alike; what most people have comes first. What the laboratory tells of itself is said there."""
+    alike; what most people have comes first. The laboratory's faults are in its own part."""
     shared = [found for found in _found(people) if len(found.people) > 1]
     shared.sort(key=lambda found: -len(found.people))
     said = [_told(found, people) for found in shared[:_MOST_TOLD]]
@@ -222,7 +222,7 @@ def _asked(found: _Found, people: Sequence[Searched]) -> int:
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:
-    """From the least to the largest, and whether they may all be the same."""
+    """From the least to the largest, and whether they are equal within their intervals."""
     known = [n for n in numbers if n is not None]
     if len(known) < len(numbers) or len({n.name for n in known}) > 1:
         return ""
@@ -237,7 +237,7 @@ def _sizes(numbers: Sequence[Number | None]) -> str:
         return span
     if p_of_one_size(values, widths) < _DIFFER:
         return f"{span}; the sizes differ by more than their intervals"
-    return f"{span}; the sizes may all be the same"
+    return f"{span}, equal within their intervals"
 
 
 def named_people(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The reports' figures. matplotlib and fontconfig are told where their caches are to lie.
+"""The reports' figures, with the places of matplotlib's and fontconfig's caches.
 
 Without a home that can be written to, both would print warnings, in every process.
 """

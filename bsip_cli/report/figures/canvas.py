@@ -119,13 +119,13 @@ def thinned(length: int, most: int = MOST_POINTS) -> slice:
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Half-open index pairs of the stretches where ``flags`` holds."""
+    """Half-open index pairs of the intervals where ``flags`` holds."""
     steps = np.diff(np.concatenate([[0], np.asarray(flags, dtype=int), [0]]))
     return list(zip(*(np.flatnonzero(steps == s).tolist() for s in (1, -1)), strict=True))
 
 
 def middle_of_longest(time_s: np.ndarray, flags: np.ndarray, seconds: float) -> slice:
-    """Up to ``seconds`` from the middle of the longest stretch where ``flags`` holds."""
+    """Up to ``seconds`` from the middle of the longest interval where ``flags`` holds."""
     stretches = runs(flags)
     if not stretches:
         return slice(0, 0)

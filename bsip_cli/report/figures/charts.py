@@ -33,7 +33,7 @@ from bsip_cli.statistics.samples import Z95
 # --- bars: errors cut into what makes them, residuals of markers, masses of segments ---------------
 
 COLOURS = (BLUE, "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#009E73", FAINT, "#8C510A")
-"""As those of the first page's bar: Okabe and Ito, told apart by the colour-blind."""
+"""As those of the first page's bar: Okabe and Ito, which the colour-blind can distinguish."""
 _TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 _FIXED = {"noise": ("#ffffff", ""), "unknown": ("#ffffff", "////")}
 
@@ -47,16 +47,18 @@ class Whole:
 
 
 @house_style()
-def error_bars(bars: Sequence[Whole]) -> Figure:
-    """One bar each; what makes the error smaller stands left of zero. Hatched: unknown."""
+def error_bars(bars: Sequence[Whole], first: Sequence[str] = ()) -> Figure:
+    """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
+    labels that get the first colours, as the first page's bar gives them."""
     figure = new_figure(24.0 + 6.0 * len(bars))
     axes = figure.add_subplot()
     labels = list(dict.fromkeys(label for bar in bars for label, _ in bar.shares))
-    ordinary = [label for label in labels if label not in _FIXED]
-    order = (*ordinary, *(one for one in _FIXED if one in labels))
+    ordinary = [one for one in dict.fromkeys((*first, *labels)) if one not in _FIXED]
+    order = [one for one in (*ordinary, *_FIXED) if one in labels]
     ends = np.zeros((len(bars), 2))  # left of zero, right of it
     for label in order:
-        colour, hatch = _FIXED.get(label) or (COLOURS[ordinary.index(label) % len(COLOURS)], "")
+        again, k = (0, 0) if label in _FIXED else divmod(ordinary.index(label), len(COLOURS))
+        colour, hatch = _FIXED.get(label) or (COLOURS[k], "||" * again)
         shares = np.array([dict(bar.shares).get(label, 0.0) for bar in bars])
         side = (shares > 0).astype(int)
         start = ends[range(len(bars)), side]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import (
+    WORDS,
     Block,
     Bullets,
     Cell,
@@ -19,7 +20,6 @@ from bsip_cli.report.blocks import (
     Paragraph,
     Picture,
     Section,
-    Terms,
 )
 from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import marker_bars, segment_masses
@@ -56,21 +56,6 @@ CANNOT_KNOW = (
     "An error that is the same in all recordings can hide in the identified parameters.",
     "Frames are not independent: intervals allow for it.",
 )
-GLOSSARY = (
-    ("COP", "Centre of pressure: where on the plate the ground force acts."),
-    ("RM", "Regression method: segment parameters from an anthropometric table."),
-    ("RM+mass", "RM, all masses and tensors times one number, so that the plates' weight fits."),
-    ("OM", "Optimisation method: parameters identified from this person's movement and forces."),
-    ("OM+causes", "OM identified again with every named fault in the model."),
-    ("Segment parameters", "Mass, centre of mass and moments of inertia of a body segment."),
-    ("Data decide", "Part of the table's uncertainty that the recordings removed; 0: the table."),
-    ("Error budget", "What makes the squared difference of simulated and measured forces."),
-    ("Held out", "Data that identified nothing, on which methods are compared."),
-    ("Probability", "That a fault is there, given all else that was found."),
-    ("95 % interval", "Holds the true value in 95 of 100 such recordings."),
-    ("sd", "Standard deviation."),
-    ("BW", "Body weight."),
-)
 
 
 def participant_document(record: ParticipantRecord) -> Document:
@@ -78,7 +63,7 @@ def participant_document(record: ParticipantRecord) -> Document:
     made += how_made(HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
-        subtitle="Ground forces computed from the motion, against the plates'.",
+        subtitle="Ground forces measured by plates, against those computed from markers.",
         front=front(record),
         sections=(
             diagnosis.section(record),
@@ -87,7 +72,7 @@ def participant_document(record: ParticipantRecord) -> Document:
             parameters_section(record),
             recording_section(record),
             Section("made", "How was it made, and what can it not know?", tuple(made)),
-            Section("words", "What do the words mean?", (Terms(GLOSSARY),)),
+            WORDS,
         ),
     )
 
@@ -219,11 +204,7 @@ def _markers(record: ParticipantRecord) -> Iterator[Block]:
 def _events(record: ParticipantRecord) -> Iterator[Block]:
     """What the inverse kinematics says of single markers; nothing where it was not asked."""
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
-    lines = [
-        f"{label}: {sentence} ({number(_MM * float(size), 0)} mm)"
-        for label, table in known
-        for sentence, size in zip(table["sentence"], table["size_m"], strict=True)
-    ]
+    lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
     if known and not lines:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
     elif lines:
@@ -357,13 +338,13 @@ def _next(record: ParticipantRecord) -> Iterator[Block]:
     combinations = table[table["quantity"] == "combinations"]
     silent = [segment_label(n) for n in combinations.loc[combinations["value"] == 0, "name"]]
     if silent:
-        yield Paragraph(f"The movement tells nothing of {listing(silent)} that the table does not.")
+        yield Paragraph(f"These recordings add nothing to the table for {listing(silent)}.")
     steps = table[table["quantity"] == "next"].head(_MOST_STEPS)
     if len(steps):
         yield Heading("What to record next time")
         yield Numbered(
             tuple(
-                f"{capital(row['text'])}: {number(row['value'])} per cent points more decided by the "
+                f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
                 f"data, most of all for the {segment_label(row['segment'])}."
                 for row in steps.to_dict("records")
             )

@@ -16,6 +16,7 @@ from bsip_cli.report.errors import (
     Gain,
     gains_of,
     one_number_alone,
+    overall_pieces,
     pieces,
     pooled_gains,
     relative_change,
@@ -24,7 +25,7 @@ from bsip_cli.report.errors import (
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
-from bsip_cli.report.words import COMPONENTS, component_label, count, number, signed
+from bsip_cli.report.words import COMPONENTS, EXTENDED, component_label, count, number, signed
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN, is_extended
 from bsip_cli.statistics.samples import Z95
@@ -110,7 +111,7 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
             bars.append(Whole(name, parts))
     if bars:
         yield Picture(
-            error_bars(bars),
+            error_bars(bars, [piece.label for piece in overall_pieces(record.budget, found)]),
             "error_budget",
             "What makes the error of the table's parameters (RM) in each component, and how large it "
             "is, over all recordings.",
@@ -283,7 +284,10 @@ def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
     return Panel(
         f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]",
         time,
-        {method: own["moment_Nm"].to_numpy() for method, own in of.items()},
+        {
+            EXTENDED if is_extended(method) else method: own["moment_Nm"].to_numpy()
+            for method, own in of.items()
+        },
         {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM},
     )
 

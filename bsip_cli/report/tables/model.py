@@ -197,7 +197,7 @@ _TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding
 def texts_of(
     name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
 ) -> tuple[str, tuple[str, ...]]:
-    """Title and legend of a table; ``more``: what only this one tells."""
+    """Title and legend of a table; ``more``: what only this one says."""
     words = _TEXTS["shared"] | more
     words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
     words["percent"] = f"{criteria.equivalence_percent:g}"
@@ -269,7 +269,7 @@ def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
                 "participants; there its error is that of a fit, not of a prediction."
             )
         elif counted["role"] == "sequence":
-            sentences.append(f"{task}: only stretches that OM was not fitted to.")
+            sentences.append(f"{task}: only intervals that OM was not fitted to.")
     return tuple(sentences)
 
 

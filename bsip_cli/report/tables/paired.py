@@ -1,4 +1,4 @@
-"""The tables of paired tests (1, 2, 4 and 6): OM beside its rivals RM and RM+mass."""
+"""The tables of paired tests (1, 2, 4 and 6): OM against RM and RM+mass."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _paired(
     given: tuple[Results, Criteria],
     **more: str,
 ) -> Table:
-    """``tests``: whose number is told. ``columns``: those before the tests of OM, and after them.
+    """``tests``: whose number is printed. ``columns``: those before the tests of OM, and after them.
     ``named``: the label of each topic, a row each. ``row``: its own values, and its group."""
     results, criteria = given
     before, after = columns

@@ -370,8 +370,8 @@ def _finding(
     )
     sentence = (
         f"large error, cause unknown: {factor * worst.error:.3g} {read} of "
-        f"{_WORDS[worst.component]} (RMS) remain unexplained{follows}; in good recordings at most "
-        f"{factor * yardsticks.of(worst.component):.3g} {read} remain; "
+        f"{_WORDS[worst.component]} (RMS) remain unexplained{follows}; "
+        f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more; "
         f"{along(trials, worst.component)}{interval_words((number,))}"
     )
     return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.chance, 1 - worst.chance)

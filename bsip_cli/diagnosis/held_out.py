@@ -186,7 +186,7 @@ class Uneven(Nameless):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         told = self.effect.sentence(scene, target, values)
-        return f"no known fault makes what the forces show: {told}, but not evenly"
+        return f"of unknown cause: {told}, but not evenly"
 
 
 def plain(effect: Effect) -> Effect:

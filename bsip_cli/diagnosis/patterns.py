@@ -41,7 +41,7 @@ class Pattern(Nameless):
         """With what, and how large it is, for a sentence."""
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"no known fault makes what the forces show: {self.goes_along_with(target, values)}"
+        return f"of unknown cause: {self.goes_along_with(target, values)}"
 
 
 # --- one of the six components --------------------------------------------------------------------
@@ -194,7 +194,7 @@ class Ceiling(Component):
         ((_, unit, lacking),) = self.reported(scene, target, values)
         ceiling = self._ceiling(scene)
         return (
-            f"no known fault makes what the forces show: {OF_THE_LAB[target]} stays below "
+            f"of unknown cause: {OF_THE_LAB[target]} stays below "
             f"{ceiling:.0f} N where the motion needs up to {lacking:.0f} {unit} more, as of a "
             "channel at its limit"
         )
@@ -436,7 +436,7 @@ class ClockJump(Delay, Pattern):
         return super().possible(scene, target, values) and bool(seen)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"no known fault makes what the forces show: {self.goes_along_with(target, values)}"
+        return f"of unknown cause: {self.goes_along_with(target, values)}"
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         order = "later" if values[0] > 0 else "earlier"

@@ -107,7 +107,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
     person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
-    if np.isfinite(plates) and facts["mass_source"] != "plates":
+    if np.isfinite(plates) and number(plates, 1) != number(mass, 1):
         person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
     names = [trial.task for trial in record.trials]
@@ -178,7 +178,7 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
         unknown = ", its cause is not known" if CAUSE_UNKNOWN in light.title else ""
         said.append(f"That the error is large is certain{unknown}.")
     if any(not is_large(cause) for cause in record.causes):
-        said.append("Each finding states its own probability.")
+        said.append("Each fault states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")

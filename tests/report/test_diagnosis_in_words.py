@@ -180,7 +180,7 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     large = found[found["rank"] == 1].assign(
         effect=UNNAMED, target="", parameter="error", trials=TRIALS[0],
         sentence="large error, cause unknown: 23 N of the vertical force (RMS) remain unexplained; "
-        "in good recordings at most 15.2 N remain; nothing that bsip knows goes along with it",
+        "large is 15.2 N and more; nothing that bsip knows goes along with it",
     )  # fmt: skip
     said = verdict_of(large, detection(TRIALS))
     assert said.headline.startswith("Large error, cause unknown.")
@@ -305,13 +305,11 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
 
 def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
     uneven = found[found["rank"] == 1].assign(
-        effect=UNNAMED, sentence="no known fault makes what the forces show: plate 1 is turned, "
+        effect=UNNAMED, sentence="of unknown cause: plate 1 is turned, "
         "but not evenly (yaw: 95 % interval 1.75 to 2.26°)",
     )  # fmt: skip
     text = text_of(uneven, detection(TRIALS))
-    assert (
-        "No known fault makes what the forces show: plate 1 is turned, but not evenly (95 %" in text
-    )
+    assert "Of unknown cause: plate 1 is turned, but not evenly (95 %" in text
     assert EFFECT_WORDS[UNNAMED].follows.sentence in text
 
 

@@ -1,25 +1,26 @@
 """Are recordings free of a fault after `bsip export --what recording`?
 
-    python -m benchmarks.corrected_recordings DATA --write docs/corrected_recordings.md
+    python -m benchmarks.corrected_recordings DATA --write
 
-A fault is hidden, the study is diagnosed, exported and diagnosed again. Cases are two simulated
+A fault is hidden, the study is diagnosed, exported and diagnosed again. Free is what is told of
+nothing that was taken off, nor of what looked like it, nor of anything new. Cases are simulated
 people and, where DATA has them, real recordings. --only TEXT runs the cases whose line holds it.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
 from benchmarks.diagnosis_of_recordings import SUBJECTS
-from benchmarks.measure import ROOT, markdown, run_child
+from benchmarks.measure import RESULTS, ROOT, markdown, run_child, write_csv
 from benchmarks.recordings import make_study
 
 _STAGES = """
@@ -56,6 +57,8 @@ CASES = (
     Case(SEEDS[0], "plate_translation", 0.025, "x,plate=1"),
     Case(SEEDS[0], "plate_gain", 0.05, "fz,plate=2"),
     Case(SEEDS[0], "plate_zero", 15.0, "fx,plate=1"),
+    Case(SEEDS[0], "gravity_tilt", 0.015, "x"),
+    Case(SEEDS[1], "camera_frame", 0.02, "y"),
     Case(SEEDS[1], "plate_rotation", 0.06, "yaw,plate=1"),
     Case(SEEDS[1], "plate_crosstalk", 0.04, "fz:fy,plate=2"),
     Case(SEEDS[1], "clock_drift", 0.001, "-"),
@@ -72,25 +75,31 @@ CASES = (
 )
 
 
+Key = tuple[str, str]  # effect and target
+
+
 @dataclass(frozen=True)
 class Result:
-    """Effects and targets of all persons: named before, corrected, and not rejected afterwards."""
+    """Of all persons: sizes of what is named or in a group before and afterwards, what was
+    corrected, and what looked like that."""
 
-    before: frozenset[tuple[str, str]]
-    corrected: frozenset[tuple[str, str]]
-    after: frozenset[tuple[str, str]]
+    before: dict[Key, str]
+    corrected: frozenset[Key]
+    alike: frozenset[Key]
+    after: dict[Key, str]
 
     def is_corrected(self, case: Case) -> bool:
         return any(effect == case.effect for effect, _ in self.corrected)
 
     def is_free(self) -> bool:
-        return not self.corrected & self.after
+        new = self.after.keys() - self.before.keys() - {("none", "")}
+        return not new | ((self.corrected | self.alike) & self.after.keys())
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--write", type=Path, help="write the page here instead of printing it")
+    parser.add_argument("--write", action="store_true", help="into docs/results")
     parser.add_argument("--only", default="", help="cases whose line holds this")
     arguments = parser.parse_args()
     results = {}
@@ -101,11 +110,13 @@ def main() -> None:
             if (result := run_case(case, arguments.data, Path(scratch))) is not None:
                 results[case] = result
                 print(case.words(), result, sep=": ", file=sys.stderr, flush=True)
-    text = page(results)
+    told = {case: one for case, one in results.items() if one.is_corrected(case)}
+    header, rows = ("hidden", "before", "corrected", "afterwards", "free"), table(results)
+    free = sum(one.is_free() for one in told.values())
+    print(f"{len(told)} of {len(results)} faults were named and corrected; {free} are free of it.")
+    print(markdown(header, rows))
     if arguments.write:
-        arguments.write.write_text(text, encoding="utf-8")
-    else:
-        print(text)
+        write_csv(RESULTS / "corrected_recordings.csv", header, rows)
 
 
 def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
@@ -127,7 +138,7 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
     before = diagnosed(hidden, scratch / "out")
     said = bsip("export", hidden, "--out", scratch / "out", "--what", "recording", "--to", fixed)
     after = diagnosed(fixed, scratch / "again")
-    return Result(before, corrected_in(said), after)
+    return Result(before, *corrected_in(said), after)
 
 
 def make_children(study: Path, data: Path) -> bool:
@@ -147,33 +158,43 @@ def make_children(study: Path, data: Path) -> bool:
     return True
 
 
-def corrected_in(said: str) -> frozenset[tuple[str, str]]:
-    """Effects and targets of the lines ``NAME: corrected: EFFECT TARGET: sizes``."""
-    found = set()
+def corrected_in(said: str) -> tuple[frozenset[Key], frozenset[Key]]:
+    """Effects and targets of the lines ``NAME: corrected: EFFECT TARGET: sizes``, and of what is
+    as likely."""
+    found, alike = set[Key](), set[Key]()
     for line in said.splitlines():
         _, mark, rest = line.partition(": corrected: ")
         if mark and rest.startswith("labels "):
             pair = rest.split()
             found.add(("marker_swap", f"{pair[1]}+{pair[3]}"))
         elif mark and "taken off" in rest:
-            effect, _, target = rest.split(":")[0].partition(" ")
-            found.add((effect, target))
-    return frozenset(found)
+            others = re.search(r"\(as likely (.*), with the same", rest)
+            alike |= {_key(one) for one in others[1].split(" or ")} if others else set()
+            found.add(_key(rest.split(":")[0]))
+    return frozenset(found), frozenset(alike)
 
 
-def diagnosed(study: Path, out: Path) -> frozenset[tuple[str, str]]:
-    """Run the stages; effects and targets that are named or in a class, labels exchanged by ik."""
+def _key(words: str) -> Key:
+    effect, _, target = words.partition(" ")
+    return effect, target
+
+
+def diagnosed(study: Path, out: Path) -> dict[Key, str]:
+    """Run the stages; sizes of what is named or in a group, and of labels exchanged by ik."""
     done = run_child([sys.executable, "-c", _STAGES, str(study), str(out)], folder=ROOT)
     if done.stdout.strip().splitlines()[-1] not in ("0", str(BAD_DATA)):
         raise RuntimeError(done.stderr)
-    table = pd.concat(map(pd.read_parquet, sorted(out.glob("sub-*/sub-??_diagnosis.parquet"))))
-    found = table[table["verdict"] != "rejected"]
+    tables = pd.concat(map(pd.read_parquet, sorted(out.glob("sub-*/sub-??_diagnosis.parquet"))))
+    found: dict[Key, str] = {}
+    for row in tables[tables["verdict"] != "rejected"].itertuples():
+        key, size = (row.effect, row.target), f"{row.parameter} {row.estimate:.3g} {row.unit}"
+        found[key] = ", ".join(filter(None, (found.get(key), size if row.parameter else "")))
     events = pd.concat(
         pd.read_parquet(path) for path in sorted(out.glob("sub-*/*_marker-events.parquet"))
     )
-    swaps = events[events["put_right"].astype(bool)]
-    pairs = {("marker_swap", f"{m}+{p}") for m, p in zip(swaps.marker, swaps.partner, strict=True)}
-    return frozenset({*zip(found["effect"], found["target"], strict=True), *pairs})
+    for one in events[events["put_right"].astype(bool)].itertuples():
+        found["marker_swap", f"{one.marker}+{one.partner}"] = f"{one.end_s - one.start_s:.3g} s"
+    return found
 
 
 def bsip(*arguments: object) -> str:
@@ -185,29 +206,22 @@ def bsip(*arguments: object) -> str:
     return done.stderr
 
 
-def page(results: dict[Case, Result]) -> str:
-    """How many cases are free, and a line for each."""
-    told = {case: one for case, one in results.items() if one.is_corrected(case)}
-    free = sum(one.is_free() for one in told.values())
-    header = ("hidden", "before", "corrected", "afterwards", "free")
-    rows = [
+def table(results: dict[Case, Result]) -> list[tuple[str, ...]]:
+    """A row for each case, with sizes."""
+    return [
         (
             case.words(),
-            *(_words(part) for part in (one.before, one.corrected, one.after)),
-            "not corrected" if case not in told else "yes" if one.is_free() else "no",
+            _words(one.before),
+            _words(dict.fromkeys(one.corrected, "")),
+            _words(one.after),
+            "not corrected" if not one.is_corrected(case) else "yes" if one.is_free() else "no",
         )
         for case, one in results.items()
     ]
-    return (
-        "# Corrected recordings, diagnosed again\n\n"
-        f"{len(told)} of {len(results)} hidden faults were named and corrected; {free} of these "
-        f"{len(told)} recordings are free of what was corrected. "
-        "By `python -m benchmarks.corrected_recordings`.\n\n" + markdown(header, rows) + "\n"
-    )
 
 
-def _words(found: Sequence[tuple[str, str]] | frozenset[tuple[str, str]]) -> str:
-    return ", ".join(" ".join(filter(None, one)) for one in sorted(found))
+def _words(found: dict[Key, str]) -> str:
+    return "; ".join(" ".join(filter(None, (*key, size))) for key, size in sorted(found.items()))
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.plates import ALL, loaded_plates
+from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -151,7 +152,7 @@ class _Correction:
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
         self._swaps = list(pairs.itertuples(index=False, name=None))
         self.causes: dict[Cause, str] = {}  # and what else it may be
-        told = unit.read("overall-diagnosis")
+        self._told = told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
         for cause in causes_here(unit, [*self._plates]):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
@@ -175,8 +176,9 @@ class _Correction:
                 self.causes[cause] = others
         here = _said_of(unit.name, told, [*EFFECTS])
         self.left += dict.fromkeys(
-            f"{effect} {target}: of unknown size in this recording, or one of several causes"
-            for effect, target in here[["effect", "target"]].to_numpy()
+            f"{effect} {target}".strip()
+            + (": one of several causes that look alike" if group else ": its size is not known")
+            for effect, target, group in here[["effect", "target", "class_id"]].to_numpy()
             if (effect, target) not in known
         )
         # what is there and has no name, or acts like a fault but not evenly
@@ -209,13 +211,13 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
-            *(_words(*one, scene) for one in self.causes.items() if scene is not None),
+            *(_words(*one, scene, self._told) for one in self.causes.items() if scene is not None),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
                 for a, b, start, end in self._swaps
             ),
             *(
-                f"{n} frames at the {end} left out: their forces were not recorded"
+                f"frames left out at the {end}, whose forces were not recorded: {n}"
                 for n, end in ((cut.start, "beginning"), (last - cut.stop, "end"))
                 if n
             ),
@@ -392,21 +394,27 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
 
 
 def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
-    """Rows about the laboratory of a person who was in one only, or about this session in it."""
+    """Rows about the laboratory of a person who was in one only, with others, or about this
+    session in it."""
     of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
-    mine = [number for number, persons in of_all if unit.person.id in persons]
-    if len(mine) != 1:
+    mine = [number for number, persons in of_all if {unit.person.id} < {*persons}]
+    if len(mine) != 1:  # alone the person's own diagnosis, which asks more of it, is the answer
         return empty_table("laboratory")
     rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
     session = "_ses-".join(filter(None, (unit.person.id, unit.own_trial.session)))
     return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
+def _rows_of(cause: Cause, told: pd.DataFrame) -> pd.DataFrame:
+    """What the diagnosis says of a cause, a row for each number."""
+    key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
+    return told[(told[[*key]] == pd.Series(key)).all(axis=1)]
+
+
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
     """Effects and targets that look like a cause in these recordings."""
-    trials = ", ".join(cause.trials)
+    groups = set(_rows_of(cause, told)["class_id"]) - {""}
     is_it = (told["effect"] == cause.effect.name) & (told["target"] == cause.target)
-    groups = set(told.loc[is_it & (told["trials"] == trials), "class_id"]) - {""}
     others = told[told["class_id"].isin(groups) & ~is_it]
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
 
@@ -424,12 +432,21 @@ def _stated(reading: PlateReading) -> PlateReading:
     )
 
 
-def _words(cause: Cause, others: str, scene: Scene) -> str:
-    sizes = cause.effect.reported(scene, cause.target, cause.values)
-    values = ", ".join(f"{name} {value:.4g} {unit}" for name, unit, value in sizes)
+def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:
+    """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
+    readers of C3D know."""
+    values, rows = [], _rows_of(cause, told).set_index("parameter")
+    for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
+        factor, readable = readable_unit(name, unit)
+        low, high = factor * rows.reindex([name])[["ci_low", "ci_high"]].to_numpy()[0]
+        size, interval = f"{factor * value:.3g}", ""
+        if high > low:
+            size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))
+            interval = f" (95 % interval {' to '.join(ends)})"
+        values.append(f"{name} {with_unit(size, readable)}{interval}")
     alike = f" (as likely {others}, with the same sum of forces)" if others else ""
     words = " ".join(filter(None, (cause.effect.name, cause.target)))
-    return f"{words}: {values} taken off{alike}"
+    return f"{words}: {', '.join(values)} taken off{alike}".replace("°", " deg")
 
 
 def _in_reading(

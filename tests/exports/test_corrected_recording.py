@@ -21,6 +21,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
 from bsip_cli.commands.export_recording import causes_here
+from bsip_cli.diagnosis.findings import Number
 from bsip_cli.instruments.c3d_plates import wired_plates
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
@@ -75,6 +76,7 @@ class Study:
         self,
         *causes: tuple[str, str, list[float]],
         alike: Sequence = (),
+        numbers: tuple[Number, ...] = (),
         looked_at: Sequence[str] = (STEM, STATIC),
         concerned: Sequence[str] = (STEM,),
     ) -> None:
@@ -82,9 +84,10 @@ class Study:
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
         none = nothing(0.01, (STEM,))
+        said = {"class_id": "A"} if alike else {"numbers": numbers}
         findings = (
-            replace(none, effect=effect, target=target, class_id="A")
-            for effect, target in (group if alike else ())
+            replace(none, effect=effect, target=target, **said)
+            for effect, target in (group if alike or numbers else ())
         )
         table = rows_of(tuple(findings), ())
         facts = [
@@ -191,7 +194,7 @@ def test_forces_are_back_at_their_time(hide, faults, capsys):
     spoilt = wrenches(read_recording(study.made.study / "sub-01" / path.name))
     spoilt = spoilt[:, : now.shape[1]] - wrenches(before)[:, 5 * first :][:, : now.shape[1]]
     assert np.abs(uniform_filter1d(spoilt, 25, axis=1)[:, 25:-25]).max() > 3.0
-    assert "frames at the end left out: their forces were not recorded" in said
+    assert "frames left out at the end, whose forces were not recorded: " in said
 
 
 @pytest.mark.parametrize("turned", [TILTED, TURNED_CAMERAS])
@@ -268,11 +271,16 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     before, after = both(study, exported)
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
     said = capsys.readouterr().err
-    assert f"{STEM}: corrected: plate_gain 1 fz: gain 0.06 1 taken off" in said
+    assert f"{STEM}: corrected: plate_gain 1 fz: gain 6 % taken off" in said
     assert "corrected: plate_gain 2 fz" not in said
     for scope in ("laboratory", "session"):
         left = f"not corrected: 2 fz {scope}: no size of it is known for this recording"
         assert f"{STEM}: {left}" in said
+    shutil.rmtree(exported.parents[1])
+    alone = {"facts": facts | {"persons": {"1": {"sub-01": "sub-01"}}}}
+    write_artifact(path, "laboratory", rows, NOTES | alone)  # nobody else was recorded there
+    study.exported()
+    assert f"export: {STEM}: nothing to correct" in capsys.readouterr().err
 
 
 def test_plates_that_tell_points_read_what_they_would_have_read(hide, capsys):
@@ -398,7 +406,7 @@ def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
     study = hide(GAIN[0])
     study.diagnosed_as(alike=[("plate_gain", "all fz")])
     study.exported()
-    assert "not corrected: plate_gain all fz: of unknown size" in capsys.readouterr().err
+    assert "not corrected: plate_gain all fz: one of several causes" in capsys.readouterr().err
 
 
 def test_what_has_no_name_is_said(hide, capsys):
@@ -416,6 +424,16 @@ def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
     assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in (
         capsys.readouterr().err
     )
+
+
+def test_the_size_is_said_with_its_interval(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(GAIN[1], numbers=(Number("gain", "1", 0.06, 0.0552, 0.0657),))
+    path = study.exported()
+    said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
+    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
+    entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
+    assert said in entry
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

@@ -187,8 +187,8 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     assert said.limits == "Faults of any size may hide behind so large an error."
     (cause,) = causes_of(candidates_of(large))
     assert cause_line(cause, TRIALS) == (
-        "23 N of the vertical force (RMS) remain unexplained, only in sequence (run 1); in good "
-        "recordings at most 15.2 N remain."
+        "23 N of the vertical force (RMS) remain unexplained, only in sequence (run 1); large "
+        "is 15.2 N and more."
     )
     both = pd.concat([large, found[found["rank"] > 1]])
     assert (

@@ -292,10 +292,11 @@ class Implement(Effect):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         distance = values[1] / values[4]
-        holding = "both hands hold" if "+" in target else f"the {in_words(target)} holds"
+        both = "+" in target
+        holding = "both hands hold" if both else f"the {in_words(target)} holds"
         return (
-            f"{holding} {values[0] / distance:.2f} kg whose centre is {distance:.2f} m away, as of "
-            "a club or racket"
+            f"{holding} {values[0] / distance:.2f} kg whose centre is {distance:.2f} m from the "
+            f"{'hands' if both else 'hand'}, as of a club or racket"
         )
 
 

@@ -124,7 +124,8 @@ def use_sentence(
     first = choice.iloc[0]
     said = f"{use} {_IN_WORDS[str(first['use'])]}{_compared(first)}."
     others = [
-        f"{method} for {listing(list(rows['movement']))}"
+        f"For {listing(list(rows['movement']))} use {method}: OM is "
+        f"{'' if method == OM else 'not '}clearly better there."
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
@@ -132,7 +133,7 @@ def use_sentence(
     warned = [
         f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
     ]
-    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
+    return " ".join([said, *others, *warned])
 
 
 def _compared(first: pd.Series) -> str:

@@ -140,7 +140,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "Markers from model: 6.7 mm , good" in first
     assert "Use OM (segment parameters identified from this person): in " in first
     assert "it errs 34 to 46 % less than RM (table)," in first
-    assert "But RM for basketball." in first
+    assert "For basketball use RM: OM is not clearly better there." in first
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
 

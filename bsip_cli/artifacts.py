@@ -166,7 +166,7 @@ def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFr
     """
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            _check_kind(_header_in(file.schema_arrow), SCHEMAS[kind], path)
+            _check_kind(file.schema_arrow, SCHEMAS[kind], path)
             _check_intact(path)
             if not wanted:
                 return file.read().to_pandas()
@@ -184,11 +184,12 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
         ``kind``, it is of another kind or version.
     """
     try:
-        found = _header_in(pq.read_schema(path))
+        as_written = pq.read_schema(path)
+        found = _header_in(as_written)
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise _not_an_artifact(path, error) from None
     if kind is not None:
-        _check_kind(found, SCHEMAS[kind], path)
+        _check_kind(as_written, SCHEMAS[kind], path)
     _check_intact(path)
     return found
 
@@ -239,16 +240,31 @@ def _has_shape(value: Any, shape: Any) -> bool:
     return isinstance(value, shape)
 
 
-def _check_kind(found: Mapping, schema: Schema, path: Path) -> None:
-    if (found.get("kind"), found.get("schema_version")) == (schema.kind, schema.version):
-        return
-    stage = found.get("provenance", {}).get("made_by", {}).get("stage", "STAGE")
+def _check_kind(as_written: pa.Schema, schema: Schema, path: Path) -> None:
+    found = _header_in(as_written)
+    have = f"{found.get('kind', 'an unknown table')} version {found.get('schema_version')}"
+    expected = f"{schema.kind} version {schema.version}"
+    if have == expected:
+        missing, unknown = _other_columns(schema, as_written.names)
+        if not missing and not unknown:
+            return
+        changes = (("without", missing), ("with", unknown))
+        some = (f"{word} {', '.join(names)}" for word, names in changes if names)
+        have = f"{schema.kind} {' and '.join(some)}, as another version of bsip wrote it"
+        expected = f"the columns of {schema.kind} in docs/artifacts.md"
     raise BadDataError(
-        f"holds {found.get('kind', 'an unknown table')} version {found.get('schema_version')}",
-        expected=f"{schema.kind} version {schema.version}",
+        f"holds {have}",
+        expected=expected,
         file=path,
-        remedy=f"run `bsip {stage}` again",
+        remedy=f"run `bsip {found['provenance']['made_by'].get('stage', 'STAGE')}` again",
     )
+
+
+def _other_columns(schema: Schema, names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Those that are missing, and those that are unknown."""
+    plain = [column.name for column in schema.columns if not column.name.endswith("*")]
+    missing = [name for name in plain if name not in names]
+    return missing, [name for name in names if schema.column(name) is None]
 
 
 def _not_an_artifact(path: Path, error: Exception) -> BadDataError:
@@ -262,9 +278,7 @@ def _not_an_artifact(path: Path, error: Exception) -> BadDataError:
 
 def _to_arrow(schema: Schema, rows: Rows) -> pa.Table:
     frame = rows if isinstance(rows, pd.DataFrame) else table_of(schema.kind, rows)
-    plain = [column.name for column in schema.columns if not column.name.endswith("*")]
-    missing = [name for name in plain if name not in frame.columns]
-    unknown = [name for name in frame.columns if schema.column(name) is None]
+    missing, unknown = _other_columns(schema, list(frame.columns))
     if missing or unknown:
         raise ValueError(f"{schema.kind}: missing columns {missing}, unknown columns {unknown}")
     fields = _fields(schema, list(frame.columns))

@@ -173,6 +173,17 @@ def test_unknown_version_names_the_command_to_rerun(written):
     )
 
 
+@pytest.mark.parametrize("change", ["without", "with"])
+def test_other_columns_are_another_version(written, change):
+    table = pq.read_table(written)
+    name = table.column_names[-1] if change == "without" else "colour"
+    other = table.drop([name]) if change == "without" else table.append_column(name, table[0])
+    pq.write_table(other, written)
+    for read in (read_header, read_artifact):
+        with pytest.raises(BadDataError, match=f"holds used-blocks {change} {name}, as another"):
+            read(written, "used-blocks")
+
+
 def test_another_kind_under_this_name(written):
     with pytest.raises(BadDataError, match="holds used-blocks version 1; expected bsip version 1"):
         read_artifact(written, "bsip")

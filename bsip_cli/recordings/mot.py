@@ -14,6 +14,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.model import Finding, refusal
+from bsip_cli.recordings.plates import LIGHT_N
 from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,
@@ -38,7 +39,6 @@ _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
 _AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_TOLD = 12
-_LIGHT_N = 20.0  # laboratories set points and moments below 10 to 20 N to nothing
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -256,7 +256,7 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
     for force in forces:  # a missing point or moment of no force is zero
         idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
-        light = np.linalg.norm(force.force_N, axis=1) < _LIGHT_N
+        light = np.linalg.norm(force.force_N, axis=1) < LIGHT_N
         for values in (force.point, force.moment):
             if values is not None:
                 values[idle & ~np.isfinite(values).all(axis=1)] = 0.0

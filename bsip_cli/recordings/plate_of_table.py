@@ -11,7 +11,7 @@ import numpy as np
 from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.plate_reading import AS_STATED, PlateReading, Reference, faults_of_channels
 from bsip_cli.recordings.plate_source import PlateSource, averaged, in_lab, later_samples
-from bsip_cli.recordings.plates import CHANNELS, LOADED_N, crossing
+from bsip_cli.recordings.plates import CHANNELS, LIGHT_N, crossing
 
 _LEVEL = 0.5  # sine of an axis' slope
 _HARDLY = 0.05  # of a bell: less of it has points
@@ -44,7 +44,7 @@ class ForceOnPoint:
         """Loaded, and without the point that other loads have, (n,) bool."""
         if self.points is None or not self.points_move:
             return np.zeros(len(self.known), bool)
-        loaded = np.linalg.norm(np.nan_to_num(self.force_N), axis=1) > LOADED_N
+        loaded = np.linalg.norm(np.nan_to_num(self.force_N), axis=1) > LIGHT_N
         return loaded & ~self.points.any(axis=1)
 
     def parts(self) -> np.ndarray:

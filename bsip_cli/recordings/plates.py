@@ -21,6 +21,7 @@ CHANNELS_OF = {
     4: CHANNELS,
 }
 LOADED_N = 100.0  # a foot stands on the plate
+LIGHT_N = 20.0  # laboratories set points and moments below 10 to 20 N to nothing
 _LEAST_FORCE_N = 1e-6
 _MM = 1e3
 

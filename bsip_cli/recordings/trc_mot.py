@@ -203,8 +203,11 @@ def _source(
         rotation_world_lab=rotation,
     )
     wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
-    written = np.hstack([source.force_N, source.moment])
-    samples = check_samples(wrench, written, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
+    samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
+    without_point = np.zeros(len(rows), bool)
+    if source.points is not None and source.points_move:
+        without_point = ~source.points.any(axis=1)
+    samples.stuck[without_point, 3:5] = False  # such loads are marked once their point is settled
     samples = replace(samples, not_a_number=missing, silent_channels=())  # no column, or no torque
     expected = (
         f"forces as long as the markers, {markers.span()} s (the file "

@@ -204,10 +204,9 @@ def _source(
     )
     wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
     samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
-    without_point = np.zeros(len(rows), bool)
     if source.points is not None and source.points_move:
-        without_point = ~source.points.any(axis=1)
-    samples.stuck[without_point, 3:5] = False  # such loads are marked once their point is settled
+        # Loads without a point are marked once it is known whose points they are.
+        samples.stuck[np.flatnonzero(~source.points.any(axis=1)), 3:5] = False
     samples = replace(samples, not_a_number=missing, silent_channels=())  # no column, or no torque
     expected = (
         f"forces as long as the markers, {markers.span()} s (the file "

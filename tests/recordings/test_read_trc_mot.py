@@ -343,19 +343,6 @@ def test_a_load_without_a_point_is_marked_and_said(tmp_path):
     )
 
 
-def test_level_moments_at_the_point_that_are_nothing_but_rounding_are_no_fault(tmp_path):
-    markers, labels = standing_markers(N)
-    time_s, (force, moment) = np.arange(N) / 100.0, standing_wrench(N)
-    force[:, 2] += 200.0 * np.sin(7.0 * time_s)
-    columns = _columns(force, moment)
-    for axis in "xz":
-        columns[f"ground_force_1_m{axis}"] = np.where(np.arange(N) % 37 == 5, 1e-6, 0.0)
-    write_trc(tmp_path / "a.trc", time_s, markers @ TURN, labels)
-    write_mot(tmp_path / "a.mot", time_s, columns)
-    (plate,) = read_recording(tmp_path / "a.trc").plates
-    assert plate.usable.all()
-
-
 def test_exchanged_points_are_no_missing_ones():
     """Points are zero while their own plate bears nothing, which is while the other one does."""
     first, second = of_table()

@@ -22,7 +22,7 @@ class Quantity:
 
     ``names`` are what people call it, in small letters and without blanks.
     ``guessed`` are units that are looked for where none is stated, ``slips`` those that are looked
-    for where the stated one cannot be.
+    for where the stated one cannot be; what they make below ``guessed_low`` is not meant.
     """
 
     column: str
@@ -33,6 +33,7 @@ class Quantity:
     guessed: tuple[str, ...]
     slips: tuple[str, ...]
     names: str
+    guessed_low: float = 0.0
 
     def holds(self, value: float) -> bool:
         return self.low <= value <= self.high
@@ -64,6 +65,7 @@ HEIGHT = Quantity(
     ("m", "cm", "mm", "in"),
     "height stature bodyheight grösse größe groesse körpergrösse körpergröße koerpergroesse "
     "taille talla altura estatura altezza statura",
+    0.75,  # the median at one year (WHO 2006), before which children do not walk: 66 are inches
 )
 _SPELLINGS = {
     "kg": "kg kgs kilo kilos kilogram kilograms kilogramm",
@@ -109,7 +111,9 @@ def readings_of(text: str, quantity: Quantity, unit: str = "") -> tuple[Reading,
     if first := _within(quantity, [(number * quantity.units[stated], stated)], True):
         return first
     others = quantity.guessed if not unit else quantity.slips if unit in quantity.slips else ()
-    return _within(quantity, [(number * quantity.units[u], u) for u in others], False)
+    guessed = ((number * quantity.units[u], u) for u in others)
+    likely = [one for one in guessed if one[0] >= quantity.guessed_low]
+    return _within(quantity, likely, False)
 
 
 def _within(quantity: Quantity, values, is_stated: bool) -> tuple[Reading, ...]:

@@ -146,7 +146,7 @@ class _Correction:
         self.unit, self.left = unit, list[str]()
         trial, table = unit.own_trial, unit.read("readings")
         self._session = reading_of(table, unit.facts("readings"), trial)
-        self._opened = opened(unit, trial).in_frame(self._session.frame)
+        self._opened = opened(unit, trial, self._session.written).in_frame(self._session.frame)
         events = unit.read("marker-events")
         exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]

@@ -31,7 +31,7 @@ _MOST_OF_IT = 0.5  # of the body's mass
 _OFTEN = 0.9  # of the frames
 _FEWEST_FRAMES = 10
 _ROUNDS = 5  # of weights that follow the residuals
-_FALLS = 0.2  # of gravity: less is flight
+FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
 _ALIKE = 0.15  # logarithm of force over motion: its scatter over sound recordings, see above
 _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
@@ -229,7 +229,7 @@ class _Complete:
         that the motion needs, and the weight is what they nearly reach at most."""
         needed = GRAVITY_M_S2 + body.rate[:, 2]
         known = np.isfinite(needed) & np.isfinite(wrench).all(axis=1) & (wrench[:, 2] > 0)
-        known &= needed > _FALLS * GRAVITY_M_S2
+        known &= needed > FALLS * GRAVITY_M_S2
         if not known.any():
             return None
         mass = wrench[known, 2] / needed[known]

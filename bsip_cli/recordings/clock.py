@@ -18,6 +18,7 @@ from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, Gate
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_source import Opened, PlateSource, later_samples
 from bsip_cli.recordings.scene import by_segment
+from bsip_cli.recordings.written import OTHER_RATE, PACES
 
 DELAYED = -4.6
 """Logarithm: clocks differ by more than `LEAST_S` in one trial of a hundred."""
@@ -26,13 +27,6 @@ LEAST_S = 0.1  # a smaller delay is left to the diagnosis, which sees it along t
 _MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
 _NEAR_S = 0.1  # lags so near are one
-
-OTHER_RATE = -4.6
-"""Logarithm: one session of a hundred states another rate than that of its cameras."""
-
-# How many times as fast as stated: ratios of usual rates (50, 60, 100, 120, 150, 200, 240, 250 Hz).
-_SLOWER = (1.2, 1.25, 1.5, 1.67, 2.0, 2.4, 3.0, 4.0)
-PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import re
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
 
@@ -69,6 +69,7 @@ class _Table:
     time_digits: LastDigit
     is_cut: bool
     dialect: Dialect
+    force_N: float = 1.0  # what a force of 1 is, in the unit of its column
 
     def unit(self, column: int) -> str:
         """In brackets behind the column's name, else in the row of units."""
@@ -79,8 +80,8 @@ class _Table:
         return self.units[column].strip("[]() ")
 
 
-def read_mot(path: Path) -> Mot:
-    """Read the ground forces of a MOT (or STO) file.
+def read_mot(path: Path, force_N: float = 1.0) -> Mot:
+    """Read the ground forces of a MOT (or STO) file; force_N : what a force of 1 is.
 
     A missing point or moment of a force that is zero is zero: nothing acts there.
     """
@@ -89,7 +90,7 @@ def read_mot(path: Path) -> Mot:
     first = end if end and _names(end) else next((line for line in lines if line.strip()), "")
     if end is None or not first:
         raise _no_table(path)
-    table = _read_table(lines, first, path)
+    table = replace(_read_table(lines, first, path), force_N=force_N)
     stated = next((float(m[1]) for line in header if (m := _ROWS.match(line.strip()))), np.nan)
     findings = row_counts("rows of forces", stated, len(table.values))
     if table.is_cut:
@@ -309,14 +310,15 @@ def _force(
     used.update(force, point or (), moment or ())
     unit = table.unit(force[0])
     size = force_in_N(unit) if unit else 1.0
+    moments = table.values[:, moment] * table.force_N if moment else None
     if size is None:
         found, remedy = f"forces in '{printable(unit[:20])}'", "export the forces in N"
         raise refusal(path, found, "N or kN", remedy)
     return GroundForce(
         name,
-        table.values[:, force] * size,
+        table.values[:, force] * size * table.force_N,
         table.values[:, point] if point else None,
-        table.values[:, moment] if moment else None,
+        moments,
         table.unit(point[0]) if point else "",
         table.unit(moment[0]) if moment else "",
     )

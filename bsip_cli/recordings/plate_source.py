@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
 from typing import Protocol
@@ -16,6 +16,7 @@ from bsip_cli.recordings.plate_reading import (
     FrameChange,
     PlateReading,
 )
+from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
 # Of the force: what makers state for a plate's linearity and cross talk. A copy or a sum is the
 # same reading and differs by rounding; the loads of two feet differ by tens of per cent mostly.
@@ -94,10 +95,17 @@ def lift_N(source: PlateSource) -> np.ndarray:
 @dataclass(frozen=True, eq=False)
 class Opened:
     """A recording as its file has it, before it is decided how its plates' numbers are understood:
-    ``recording`` is without its plates."""
+    ``recording`` is without its plates. ``lengths`` where markers and forces have a file each, and
+    ``reread`` to open these otherwise than they say."""
 
     recording: Recording
     sources: tuple[PlateSource, ...]
+    lengths: Lengths | None = None
+    reread: Callable[[Written], Opened] | None = None
+
+    def as_written(self, written: Written) -> Opened:
+        """With forces in another unit and cameras of another rate than the files say."""
+        return self.reread(written) if self.reread and written != AS_WRITTEN else self
 
     def with_plates(self, numbers: Collection[int]) -> Opened:
         """Only plates of these numbers; without any, all."""
@@ -117,7 +125,7 @@ class Opened:
             recording = replace(recording, markers_m=recording.markers_m @ matrix.T)
         if change.moves_forces:
             sources = tuple(one.moved(matrix, change.corners_only) for one in sources)
-        return Opened(recording, sources)
+        return replace(self, recording=recording, sources=sources)
 
 
 def in_lab(change: np.ndarray, rotation_world_lab: np.ndarray) -> np.ndarray:

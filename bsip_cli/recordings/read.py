@@ -23,6 +23,7 @@ from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.settle import AGAINST, SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
+from bsip_cli.recordings.written import FORCE_UNITS_N, Written
 from bsip_cli.recordings.zero import steady_pull
 from bsip_cli.segments import TRUNK
 
@@ -162,7 +163,24 @@ def _without_missing(
 def findings_about(session: SessionReading) -> list[Finding]:
     """What was decided for all trials of a session alike."""
     plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
-    return [*_about_frame(session.frame), *(finding for found in plates for finding in found)]
+    found = (finding for found in plates for finding in found)
+    return [*_about_written(session.written), *_about_frame(session.frame), *found]
+
+
+def _about_written(written: Written) -> list[Finding]:
+    findings = []
+    if written.force_N != 1.0:
+        (unit,) = (name for name, size in FORCE_UNITS_N.items() if size == written.force_N)
+        found, expected = "in N the forces would carry nobody of this size", "forces in N"
+        action = f"read forces and moments in {unit}, in all trials; export them in N"
+        findings.append(Finding("unit", "forces", found, expected, action, "corrected"))
+    if (pace := written.pace) != 1.0:
+        found = f"the markers last {pace:.4g} times as long as the forces"
+        expected = "one time of markers and forces"
+        action = f"took the rate of the cameras as {pace:.4g} times the stated one, in all trials; "
+        action += "correct it in the files"
+        findings.append(Finding("rate", "cameras", found, expected, action, "corrected"))
+    return findings
 
 
 def _about_frame(frame: FrameChange) -> list[Finding]:

@@ -25,6 +25,7 @@ from bsip_cli.recordings.plate_source import repeated_plates
 from bsip_cli.recordings.scene import Handedness
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
+from bsip_cli.recordings.written import AS_WRITTEN, Written
 
 _SURELY_NOBODY = 0.999  # probability from which on no reading is believed
 _LEAST_LIKELY = -12.0  # logarithm: less adds nothing
@@ -68,7 +69,7 @@ class SessionReading:
 
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
-    stated rate is not believed.
+    stated rate is not believed. ``written`` : what the files of all trials are read as.
     """
 
     frame: FrameChange = field(default_factory=FrameChange)
@@ -76,6 +77,7 @@ class SessionReading:
     delays_s: Mapping[str, float] = field(default_factory=dict)
     paces: Mapping[str, float] = field(default_factory=dict)
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
+    written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
 
 

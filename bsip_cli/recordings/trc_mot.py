@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ from bsip_cli.recordings.timebase import (
 from bsip_cli.recordings.trc import Trc, read_trc
 from bsip_cli.recordings.under_the_feet import BESIDE_M
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
+from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
 _VALUES_PER_BYTE = (
     5  # of both files: a grid of forces may need as much memory as c3d_content allows
@@ -43,29 +45,30 @@ _UNIT_NAMES = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "
 _UNIT_NAMES |= {"us": 1e-6, "\N{MICRO SIGN}s": 1e-6, "microseconds": 1e-6}
 
 
-def open_trc_mot(path: Path) -> Opened:
+def open_trc_mot(path: Path, written: Written = AS_WRITTEN) -> Opened:
     """Markers from the TRC; forces as written in the file beside it, if there is one."""
     trc = read_trc(path)
     times, positions, findings = _even_markers(trc, path)
+    times = times.faster(written.pace)
     mot_path = forces_beside(path)
-    mot = read_mot(mot_path) if mot_path else None
+    mot = read_mot(mot_path, written.force_N) if mot_path else None
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up, up_of_forces = _ups(trc, positions, mot)
     rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
-    analog_rate_hz, sources, note, found = _forces(mot, of_forces, times, most)
+    read = _forces(mot, of_forces, times, most)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
         labels=trc.labels,
         markers_m=positions @ rotation.T,
-        analog_rate_hz=analog_rate_hz,
+        analog_rate_hz=read.rate_hz,
         plates=(),
-        findings=(*trc.findings, *findings, *_about_ups(up, up_of_forces), *found),
+        findings=(*trc.findings, *findings, *_about_ups(up, up_of_forces), *read.findings),
         rotation_world_lab=rotation,
-        forces_note=note,
+        forces_note=read.note,
         time0_s=times.first_s,
     )
-    return Opened(recording, sources)
+    return Opened(recording, read.sources, read.lengths, partial(open_trc_mot, path))
 
 
 def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple[Finding, ...]]:
@@ -144,14 +147,24 @@ def _about_ups(up: scene.Up, of_forces: scene.Up) -> list[Finding]:
     return [Finding("up_axis", "forces", found, "one laboratory frame", action, "corrected")]
 
 
+@dataclass(frozen=True, eq=False)
+class _Forces:
+    """As written, on the markers' time; ``note``: why there are none."""
+
+    rate_hz: float
+    sources: tuple[ForceOnPoint, ...] = ()
+    lengths: Lengths | None = None
+    note: str = ""
+    findings: tuple[Finding, ...] = ()
+
+
 def _forces(
     mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int
-) -> tuple[float, tuple[ForceOnPoint, ...], str, tuple[Finding, ...]]:
-    """Analog rate, forces as written, the reason for none, findings."""
+) -> _Forces:
     if mot is None:
-        return markers.rate_hz, (), "no .mot file of the same name beside the .trc", ()
+        return _Forces(markers.rate_hz, note="no .mot file of the same name beside the .trc")
     if note := _unplaced(mot):
-        return markers.rate_hz, (), note, mot.findings
+        return _Forces(markers.rate_hz, note=note, findings=mot.findings)
     settled, grid = _settle_force_times(mot.stamps, markers), None
     findings = [*mot.findings, *settled.findings]
     if settled.stamps is not None:
@@ -160,16 +173,21 @@ def _forces(
             torn_off_s = grid.time_s[0] - settled.stamps.values[0] if grid.samples.start else 0.0
             grid = grid.from_time(markers.first_s + torn_off_s)
     if grid is None:
-        return markers.rate_hz, (), settled.note or _UNEVEN, tuple(findings)
+        note = settled.note or _UNEVEN
+        return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
     last = markers.lasts_s() * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
         rows = len(mot.stamps.values)
         note = f"the .mot has {rows} rows and {last:.3g} would be needed beside the .trc"
-        return markers.rate_hz, (), note, tuple(findings)
+        return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
     samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
     read = [_source(force, grid, samples_s, rotation, markers) for force in mot.forces]
     findings += [*grid.findings, *_about_missing(mot), *(one for _, found in read for one in found)]
-    return grid.rate_hz, tuple(source for source, _ in read), "", tuple(findings)
+    sources = tuple(source for source, _ in read)
+    forces_s = float(grid.time_s[-1] - grid.time_s[0])
+    step_s = max(1 / grid.rate_hz, 1 / markers.rate_hz)
+    lengths = Lengths(markers.lasts_s(), forces_s, step_s)
+    return _Forces(grid.rate_hz, sources, lengths, findings=tuple(findings))
 
 
 def _source(
@@ -257,6 +275,11 @@ class _MarkerTimes:
     rate_hz: float
     n: int
     unsure_s: float = 0.0  # by how much the first may be off: the last digit that is printed
+
+    def faster(self, times: float) -> _MarkerTimes:
+        """As if seen by cameras so many times as fast."""
+        slower = (self.first_s / times, self.rate_hz * times, self.n, self.unsure_s / times)
+        return self if times == 1.0 else _MarkerTimes(*slower)
 
     def lasts_s(self) -> float:
         return (self.n - 1) / self.rate_hz

@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Body, GateLimits
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Body, GateLimits
 from bsip_cli.recordings.clock import lags
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange
-from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
+from bsip_cli.recordings.plate_reading import AS_STATED, FORCES_MOVED, MIRRORS, FrameChange
+from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N, repeated_plates
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
 from bsip_cli.recordings.under_the_feet import Feet
+from bsip_cli.recordings.written import Lengths
 
 _FEW = 100  # samples that each plate of a trial is seen by
+_LOADED = 0.05  # of the largest force: less is nobody
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +27,8 @@ class TrialSamples:
     """Some samples at which plates are loaded.
 
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
-    the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``late`` : the same with the forces
+    the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
+    text file carry if they are in N, 0 where that is not known. ``late`` : the same with the forces
     of ``delay_s`` later, if these go with the motion far better; None else.
     """
 
@@ -38,12 +42,14 @@ class TrialSamples:
     loaded: dict[str, np.ndarray]
     feet: Feet
     body: Body
+    lengths: Lengths | None = None
+    mass_kg: float = 0.0
     delay_s: float = 0.0
     late: TrialSamples | None = None
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
-        stated = cls._of(opened)
+        stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
         delay_s = _delay_s(opened, stated.hands, limits) if stated.sources else 0.0
         if not delay_s:
             return stated
@@ -108,6 +114,29 @@ def _delay_s(opened: Opened, hands: Handedness, limits: GateLimits) -> float:
             if one is not None and one.log_likelihood.max() > best.log_likelihood.max():
                 best = one
     return best.delay_s(limits)
+
+
+def _mass_kg(opened: Opened) -> float:
+    """What nearly all of the force over the acceleration that it carries comes to at most."""
+    if opened.lengths is None or not opened.sources:
+        return 0.0
+    recording, names = opened.recording, {one.name: one for one in opened.sources}
+    rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
+    frames = np.arange(0, recording.n_frames, max(1, round(SMOOTH_S * rate_hz)))
+    samples = np.round(frames * analog_hz / rate_hz).astype(int)
+    count = len(opened.sources[0].usable)
+    samples, frames = samples[samples < count], frames[samples < count]
+    repeated = repeated_plates([names])
+    size = np.zeros(len(samples))
+    for name, source in names.items():
+        if name not in repeated:
+            some = source.smoothed(SMOOTH_S * analog_hz).at(samples)
+            size += np.linalg.norm(some.parts() @ some.matrix(AS_STATED)[:3].T, axis=1)
+    body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
+    needed = GRAVITY_M_S2 + body.rate[:, 2]
+    carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
+    loaded = carried[carried > _LOADED * carried.max(initial=0.0)]
+    return float(np.percentile(loaded, 90)) if len(loaded) else 0.0
 
 
 def _heavy(lift_N: np.ndarray) -> np.ndarray:

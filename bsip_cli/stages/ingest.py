@@ -39,7 +39,7 @@ from bsip_cli.stages.survey import opened, prefix_of, reading_of
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
-    recording = assemble(opened(unit, unit.own_trial), session)
+    recording = assemble(opened(unit, unit.own_trial, session.written), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, prefix_of(unit)

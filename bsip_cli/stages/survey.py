@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
+from bsip_cli.recordings.clock import DELAYED
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.model import Finding
@@ -23,6 +25,13 @@ from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence
+from bsip_cli.recordings.written import (
+    AS_WRITTEN,
+    FORCE_UNITS_N,
+    Written,
+    force_unit,
+    likely_paces,
+)
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Trial
 
@@ -36,12 +45,13 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     rows: list[dict] = []
     facts: dict[str, dict[str, float]] = {name: {} for name in _OF_TRIALS}
+    written: dict[str, dict[str, float]] = {name: {} for name in asdict(AS_WRITTEN)}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     _say_copies(unit, unit.person.trials)
     for session in dict.fromkeys(trial.session for trial in unit.person.trials):
-        mine = (trial for trial in unit.person.trials if trial.session == session)
-        seen = [x for x in (_survey(unit, trial, limits) for trial in mine) if x is not None]
+        mine = [trial for trial in unit.person.trials if trial.session == session]
+        seen = _surveyed(unit, mine, limits)
         if not seen:
             continue
         heights = [one.height_m for one in seen if one.height_m is not None]
@@ -49,14 +59,16 @@ def run(unit: Unit) -> None:
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         _say_height(unit, seen)
-        reading = settle_session(seen, limits)
+        reading = _reading(unit, mine, seen, limits)
         rows += rows_of(session or "", reading)
         for name, of_trials in facts.items():
             of_trials |= getattr(reading, name)
+        for name, value in asdict(reading.written).items():
+            written[name] |= {one.name: value for one in seen if value != 1.0}
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", rows, facts)
+    unit.write("readings", rows, facts | written)
 
 
 def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
@@ -85,10 +97,46 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
             )
 
 
-def _survey(unit: Unit, trial: Trial, limits: GateLimits) -> TrialSamples | None:
+def _reading(
+    unit: Unit, trials: Sequence[Trial], seen: Sequence[TrialSamples], limits: GateLimits
+) -> SessionReading:
+    """Of the trials as ``seen``, or as they are if their forces are in another unit than N, or their
+    cameras' rate is another than the stated one."""
+    written, masses = AS_WRITTEN, [one.mass_kg for one in seen if one.mass_kg]
+    if masses:
+        usual = Stature.of_all([one.stature for one in seen])
+        told_m = None if usual is None else usual.height_m
+        stated = unit.person.mass_kg, unit.person.height_m or told_m
+        if name := force_unit(
+            float(np.median(masses)), *stated, unit.config.ingest.mass_gross_percent
+        ):
+            written = Written(FORCE_UNITS_N[name])
+            seen = _surveyed(unit, trials, limits, written)
+    best, surely = settle_session(seen, limits), limits.corrected_percent / 100
+    now = best.log_posterior + DELAYED * len(best.delays_s)
+    most = float(np.log(surely / (1 - surely)))
+    best = replace(best, written=written)
+    for pace, odds in likely_paces([one.lengths for one in seen]).items():
+        other = replace(written, pace=pace)
+        found = settle_session(_surveyed(unit, trials, limits, other), limits)
+        gain = found.log_posterior + DELAYED * len(found.delays_s) + odds - now
+        if gain > most:
+            best, most = replace(found, written=other), gain
+    return best
+
+
+def _surveyed(
+    unit: Unit, trials: Sequence[Trial], limits: GateLimits, written: Written = AS_WRITTEN
+) -> list[TrialSamples]:
+    """Of the recordings that can be read."""
+    every = (_survey(unit, trial, limits, written) for trial in trials)
+    return [one for one in every if one is not None]
+
+
+def _survey(unit: Unit, trial: Trial, limits: GateLimits, written: Written) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
-        found = opened(unit, trial)
+        found = opened(unit, trial, written)
     except BadDataError:
         return None
     seen = TrialSamples.of(found, limits)
@@ -105,9 +153,10 @@ def _survey(unit: Unit, trial: Trial, limits: GateLimits) -> TrialSamples | None
 # --- to rows and back -------------------------------------------------------------------------
 
 
-def opened(unit: Unit, trial: Trial) -> Opened:
+def opened(unit: Unit, trial: Trial, written: Written = AS_WRITTEN) -> Opened:
     """A trial's recording, of the plates that count and of the person whose markers do."""
     found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
+    found = found.as_written(written)
     if prefix := prefix_of(unit):
         recording = found.recording
         own = sorted(person_of(recording.labels, bones, prefix).names)
@@ -172,4 +221,6 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
         corners_only=bool(first["corners_only"]),
     )
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
-    return SessionReading(frame, plates, **{name: facts[name] for name in _OF_TRIALS})
+    written = {name: facts[name].get(trial.stem, 1.0) for name in asdict(AS_WRITTEN)}
+    of_trials = {name: facts[name] for name in _OF_TRIALS}
+    return SessionReading(frame, plates, **of_trials, written=Written(**written))

@@ -1,0 +1,110 @@
+"""What text files hardly ever say, and may say wrongly: the unit of their forces (a MOT is meant to
+be in N), and the rate of the cameras (in a TRC all times follow from it, and no force does)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
+
+FORCE_UNITS_N = {"kN": 1000.0, "kilogram-force": 9.80665, "pounds-force": 4.44822}
+_HALF = 0.5  # of the weight: a person of whom one foot stands off the plates
+_PERCENT = 100.0
+_FEWEST_HZ = 2.0  # steps of the shorter file by which two lengths are the same
+OTHER_RATE = -4.6
+"""Logarithm: one session of a hundred states another rate than that of its cameras."""
+
+# How many times as fast as stated: ratios of usual rates (50, 60, 100, 120, 150, 200, 240, 250 Hz).
+_SLOWER = (1.2, 1.25, 1.5, 5 / 3, 2.0, 2.4, 3.0, 4.0)
+PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
+
+_ALIKE = 0.9  # of trials: markers and forces last as long, where nothing is wrong with their rates
+_OF_CHANCE = 0.1  # of trials: one file is cut, at a place that is anywhere in it
+
+
+@dataclass(frozen=True)
+class Written:
+    """A force of 1 in the file in N, and how many times as fast as stated the cameras ran."""
+
+    force_N: float = 1.0
+    pace: float = 1.0
+
+
+AS_WRITTEN = Written()
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Of the markers and of the forces of a trial, and the step of either's clock that is longer
+    [s], all by their own files."""
+
+    markers_s: float
+    forces_s: float
+    step_s: float
+
+    def are_alike(self, pace: float) -> bool:
+        """If the cameras ran so many times as fast as stated."""
+        return abs(self.markers_s / pace - self.forces_s) <= _FEWEST_HZ * self.step_s
+
+    def log_likelihood(self, pace: float) -> float:
+        """Of lengths so alike or different, if that is the pace, logarithm."""
+        if self.are_alike(pace):
+            return float(np.log(_ALIKE))
+        by_chance = 2.0 * _FEWEST_HZ * self.step_s / max(self.markers_s, self.forces_s)
+        return float(np.log(_OF_CHANCE) + np.log(min(by_chance, 1.0)))
+
+
+def likely_paces(trials: Sequence[Lengths | None]) -> dict[float, float]:
+    """Paces at which markers and forces last as long in more trials than at the stated rate, with
+    their logarithm of odds against that; a length counts once, as both files may be cut to it."""
+    different: list[Lengths] = []
+    for one in filter(None, trials):
+        if all(abs(one.markers_s - two.markers_s) > _FEWEST_HZ * one.step_s for two in different):
+            different.append(one)
+    prior = OTHER_RATE - np.log(len(PACES) - 1)
+    odds = {
+        float(pace): prior + sum(x.log_likelihood(pace) - x.log_likelihood(1.0) for x in different)
+        for pace in PACES[1:]
+    }
+    return {pace: log for pace, log in odds.items() if log > prior}
+
+
+def force_unit(
+    mass_kg: float, stated_kg: float | None, height_m: float | None, gross_percent: float
+) -> str:
+    """In which unit other than N forces surely are that make a person so heavy; empty if N, or if
+    that is not sure.
+
+    mass_kg : the force over the acceleration that it carries, if it were in N. Nobody of this
+    stature is so light, or twice as light; and one unit alone makes the stated mass, or a usual
+    one.
+    """
+    if height_m is None or not 0.0 < mass_kg < _HALF * BMI_KG_M2[0] * height_m**2:
+        return ""
+    usual = np.array(USUAL_BMI_KG_M2) * height_m**2
+    masses = {name: size * mass_kg for name, size in FORCE_UNITS_N.items()}
+    # Forces over the person's own weight are in no unit.
+    masses[""] = usual.mean() if is_over_weight(mass_kg, gross_percent) else 0.0
+    if stated_kg is not None:
+        found = [
+            name
+            for name, mass in masses.items()
+            if name and _apart_percent(mass, stated_kg) <= gross_percent
+        ]
+    else:
+        found = [name for name, mass in masses.items() if usual[0] <= mass <= usual[1]]
+    return found[0] if len(found) == 1 else ""
+
+
+def is_over_weight(mass_kg: float, gross_percent: float) -> bool:
+    """Whether forces are parts of the weight."""
+    return _apart_percent(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent
+
+
+def _apart_percent(one: float, other: float) -> float:
+    ratio = one / other if one > 0 else np.inf
+    return _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)

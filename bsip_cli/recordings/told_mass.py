@@ -229,7 +229,8 @@ def plates_apart(
         expected = "one weight on every plate"
         expected += "" if person_kg is None else f", the stated {person_kg:.1f} kg"
         action = "took it as it stands; look at this plate's gain, and whether something else "
-        action += "bears the person there"
+        action += "bears the person there; until then the whole force and its centre of pressure "
+        action += "are wrong while both plates bear the person"
         findings.append(Finding("plate_force", name, found, expected, action, "warning"))
     return findings
 

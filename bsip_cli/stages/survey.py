@@ -100,8 +100,8 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
 def _reading(
     unit: Unit, trials: Sequence[Trial], seen: Sequence[TrialSamples], limits: GateLimits
 ) -> SessionReading:
-    """Of the trials as ``seen``, or as they are if their forces are in another unit than N, or their
-    cameras' rate is another than the stated one."""
+    """Of the trials as ``seen``, or as they are if their forces are in another unit than N, or the
+    rate of their cameras is another than the stated one."""
     written, masses = AS_WRITTEN, [one.mass_kg for one in seen if one.mass_kg]
     if masses:
         usual = Stature.of_all([one.stature for one in seen])

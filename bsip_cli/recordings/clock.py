@@ -108,6 +108,12 @@ def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
     return gains
 
 
+def log_odds_of(of_trials: Sequence[np.ndarray], times: float) -> float:
+    """Of all trials so many times as fast as they are read, from what `PACES` are of each."""
+    nearest = int(np.argmin(np.abs(PACES - times)))
+    return float(np.sum([one[nearest] for one in of_trials]))
+
+
 def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
     """How many times as fast as stated trials ran, from what `PACES` are of each; 1 where it is not
     so likely that they ran faster, or slower."""

@@ -90,15 +90,15 @@ class Hypothesis:
         return total
 
     @cached_property
-    def _of_paces(self) -> dict[str, np.ndarray]:
+    def of_paces(self) -> dict[str, np.ndarray]:
         totals = zip(self.trials, self._totals(), strict=True)
         return {trial.name: paces(trial.body, total, self.limits) for trial, total in totals}
 
     def paces(self, percent: float) -> dict[str, float]:
         """How many times as fast as stated trials ran, other than 1, where that is so likely: one
         for all, where together they tell it, or else each its own."""
-        of_all = pace(list(self._of_paces.values()), percent)
-        own = {name: pace([one], percent) for name, one in self._of_paces.items()}
+        of_all = pace(list(self.of_paces.values()), percent)
+        own = {name: pace([one], percent) for name, one in self.of_paces.items()}
         found = own if of_all == 1.0 else dict.fromkeys(own, of_all)
         return {name: times for name, times in found.items() if times != 1.0}
 

@@ -174,12 +174,17 @@ def _about_written(written: Written) -> list[Finding]:
         found, expected = "in N the forces would carry nobody of this size", "forces in N"
         action = f"read forces and moments in {unit}, in all trials; export them in N"
         findings.append(Finding("unit", "forces", found, expected, action, "corrected"))
-    if (pace := written.pace) != 1.0:
-        found = f"the markers last {pace:.4g} times as long as the forces"
-        expected = "one time of markers and forces"
-        action = f"took the rate of the cameras as {pace:.4g} times the stated one, in all trials; "
-        action += "correct it in the files"
-        findings.append(Finding("rate", "cameras", found, expected, action, "corrected"))
+    for whose, pace in (("cameras", written.pace), ("forces", written.force_pace)):
+        if pace != 1.0:
+            lasting = pace if whose == "cameras" else 1 / pace
+            found = f"the markers last {lasting:.4g} times as long as the forces"
+            expected, level = "one time of markers and forces", "corrected"
+            action = f"took the rate of the {whose} as {pace:.4g} times the stated one, in all "
+            action += "trials; correct it in the files"
+            if written.probability < 1.0:
+                level = "warning"
+                action += f" (p = {written.probability:.2f}; else that of the forces is wrong)"
+            findings.append(Finding("rate", whose, found, expected, action, level))
     return findings
 
 

@@ -70,6 +70,7 @@ class SessionReading:
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
     stated rate is not believed. ``written`` : what the files of all trials are read as.
+    ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
 
     frame: FrameChange = field(default_factory=FrameChange)
@@ -79,6 +80,7 @@ class SessionReading:
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
+    of_paces: Sequence[np.ndarray] = field(default=(), compare=False)
 
 
 def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
@@ -115,6 +117,7 @@ def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
         paces=chosen.of.paces(limits.corrected_percent),
         maybe_paces=chosen.of.paces(100 - limits.believed_percent),
         log_posterior=chosen.of.log_posterior,
+        of_paces=tuple(chosen.of.of_paces.values()),
     )
 
 

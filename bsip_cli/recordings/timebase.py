@@ -37,6 +37,11 @@ class Stamps:
         printed, used = (size_s * digit for digit in self.digits)
         return Stamps((self.values - first) * size_s, (printed, used), "s")
 
+    def faster(self, times: float) -> Stamps:
+        """As if printed by a clock that runs so many times as fast."""
+        digits = (self.digits[0] / times, self.digits[1] / times)
+        return self if times == 1.0 else Stamps(self.values / times, digits, self.unit)
+
     def step(self) -> float:
         """Usual difference between stamps; NaN if there is none.
 

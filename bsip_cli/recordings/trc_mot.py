@@ -55,7 +55,7 @@ def open_trc_mot(path: Path, written: Written = AS_WRITTEN) -> Opened:
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up, up_of_forces = _ups(trc, positions, mot)
     rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
-    read = _forces(mot, of_forces, times, most)
+    read = _forces(mot, of_forces, times, most, written.force_pace)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
@@ -159,13 +159,13 @@ class _Forces:
 
 
 def _forces(
-    mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int
+    mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int, pace: float
 ) -> _Forces:
     if mot is None:
         return _Forces(markers.rate_hz, note="no .mot file of the same name beside the .trc")
     if note := _unplaced(mot):
         return _Forces(markers.rate_hz, note=note, findings=mot.findings)
-    settled, grid = _settle_force_times(mot.stamps, markers), None
+    settled, grid = _settle_force_times(mot.stamps.faster(pace), markers), None
     findings = [*mot.findings, *settled.findings]
     if settled.stamps is not None:
         grid = even_grid(settled.stamps, settled.rates_hz, markers.rate_hz)

@@ -28,10 +28,13 @@ _OF_CHANCE = 0.1  # of trials: one file is cut, at a place that is anywhere in i
 
 @dataclass(frozen=True)
 class Written:
-    """A force of 1 in the file in N, and how many times as fast as stated the cameras ran."""
+    """A force of 1 in the file in N; how many times as fast as stated the cameras ran, or the
+    forces were sampled; and how probable it is that it is these and not the others."""
 
     force_N: float = 1.0
     pace: float = 1.0
+    force_pace: float = 1.0
+    probability: float = 1.0
 
 
 AS_WRITTEN = Written()

@@ -10,11 +10,12 @@ from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pandas as pd
+from scipy.special import expit
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
-from bsip_cli.recordings.clock import DELAYED
+from bsip_cli.recordings.clock import DELAYED, log_odds_of
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.model import Finding
@@ -122,7 +123,17 @@ def _reading(
         gain = found.log_posterior + DELAYED * len(found.delays_s) + odds - now
         if gain > most:
             best, most = replace(found, written=other), gain
-    return best
+    if (pace := best.written.pace) == 1.0:
+        return best
+    # Markers and forces last alike if the times of either are wrong; forces are as large as the
+    # accelerations then if it is the right one.
+    of_forces = float(expit(log_odds_of(best.of_paces, 1 / pace)))
+    if of_forces >= surely:
+        other = replace(written, force_pace=1 / pace)
+        found = settle_session(_surveyed(unit, trials, limits, other), limits)
+        return replace(found, written=other)
+    doubted = replace(best.written, probability=1 - of_forces)
+    return best if 1 - of_forces >= surely else replace(best, written=doubted)
 
 
 def _surveyed(

@@ -63,6 +63,7 @@ class Export:
     # time
     marker_hz: float = 100.0
     stated_rate: float = 1.0  # over the true one
+    mot_rate: float = 1.0  # of the forces alone
     analog_per_marker: int = 10
     time_unit: str = "s"
     time_decimals: int = 6

@@ -78,7 +78,7 @@ def write_mot(path: Path, trial: Trial, export: Export, centres_m: np.ndarray) -
         )
         _add(columns, count + 1, *total, export)
     scale = 1000.0 if export.time_unit == "ms" else 1.0
-    time = scale * (seen.analog_s + export.mot_start_s)
+    time = scale * (seen.analog_s / export.mot_rate + export.mot_start_s)
     lines = [
         path.stem,
         "version=1",

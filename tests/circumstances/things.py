@@ -401,6 +401,11 @@ def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> 
     return f"the file states {export.stated_rate:g} times the cameras' rate"
 
 
+def force_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.mot_rate = pick(rng, (0.5, 0.8, 1.2, 2.0))
+    return f"times of the force table of {export.mot_rate:g} times the plates' rate"
+
+
 def forces_late(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.late_s = float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(0.05), np.log(1.0))))
     return f"forces {export.late_s:.2f} s late"
@@ -596,6 +601,7 @@ THINGS = (
     Thing(NO_EXPORT, "force_unit", force_unit, TEXT),
     Thing("time", "time", rates),
     Thing("time", "time", other_rate_stated),
+    Thing("time", "time", force_rate_stated, TEXT),
     Thing("time", "time", forces_late),
     Thing(NO_EXPORT, "time", forces_of_another, TEXT),
     Thing("time", "time", few_decimals, TEXT),

@@ -9,23 +9,29 @@ nothing makes a person of the forces, the plate is left out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import DELAYED
+from bsip_cli.recordings.clock import DELAYED, log_odds_of
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import repeated_plates
-from bsip_cli.recordings.scene import Handedness
+from bsip_cli.recordings.scene import Handedness, Stature
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
-from bsip_cli.recordings.written import AS_WRITTEN, Written
+from bsip_cli.recordings.written import (
+    AS_WRITTEN,
+    FORCE_UNITS_N,
+    Written,
+    force_unit,
+    likely_paces,
+)
 
 _SURELY_NOBODY = 0.999  # probability from which on no reading is believed
 _LEAST_LIKELY = -12.0  # logarithm: less adds nothing
@@ -81,6 +87,50 @@ class SessionReading:
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[np.ndarray] = field(default=(), compare=False)
+
+    def with_delays(self) -> float:
+        """Logarithm of the posterior, but for a constant, rare delays counted."""
+        return self.log_posterior + DELAYED * len(self.delays_s)
+
+
+def settle_written(
+    trials: Sequence[TrialSamples],
+    read: Callable[[Written], Sequence[TrialSamples]],
+    stated_kg: float | None,
+    stated_m: float | None,
+    gross_percent: float,
+    limits: GateLimits = USUAL,
+) -> SessionReading:
+    """`settle_session` of trials as their files say, or ``read`` otherwise: with forces of another
+    unit than N, or of markers or forces of another rate than the stated one.
+
+    stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
+    """
+    written, masses = AS_WRITTEN, [one.mass_kg for one in trials if one.mass_kg]
+    if masses:
+        usual = Stature.of_all([one.stature for one in trials])
+        height_m = stated_m or (None if usual is None else usual.height_m)
+        if name := force_unit(float(np.median(masses)), stated_kg, height_m, gross_percent):
+            written = Written(FORCE_UNITS_N[name])
+            trials = read(written)
+    found, surely = settle_session(trials, limits), limits.corrected_percent / 100
+    now, best = found.with_delays(), replace(found, written=written)
+    most = float(np.log(surely / (1 - surely)))
+    for pace, odds in likely_paces([one.lengths for one in trials]).items():
+        other = replace(written, pace=pace)
+        found = settle_session(read(other), limits)
+        if (gain := found.with_delays() + odds - now) > most:
+            best, most = replace(found, written=other), gain
+    if (pace := best.written.pace) == 1.0:
+        return best
+    # Markers and forces last alike if the times of either are wrong; forces are as large as the
+    # accelerations then if it is the right one.
+    of_forces = float(expit(log_odds_of(best.of_paces, 1 / pace)))
+    if of_forces >= surely:
+        other = replace(written, force_pace=1 / pace)
+        return replace(settle_session(read(other), limits), written=other)
+    doubted = replace(best.written, probability=1 - of_forces)
+    return best if 1 - of_forces >= surely else replace(best, written=doubted)
 
 
 def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:

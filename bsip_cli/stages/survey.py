@@ -7,15 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
+from functools import partial
 
-import numpy as np
 import pandas as pd
-from scipy.special import expit
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
-from bsip_cli.recordings.clock import DELAYED, log_odds_of
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.model import Finding
@@ -23,16 +21,10 @@ from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import findings_about, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
-from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
+from bsip_cli.recordings.settle import SessionReading, Verdict, settle_written
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence
-from bsip_cli.recordings.written import (
-    AS_WRITTEN,
-    FORCE_UNITS_N,
-    Written,
-    force_unit,
-    likely_paces,
-)
+from bsip_cli.recordings.written import AS_WRITTEN, Written
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Trial
 
@@ -60,7 +52,9 @@ def run(unit: Unit) -> None:
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         _say_height(unit, seen)
-        reading = _reading(unit, mine, seen, limits)
+        stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
+        read = partial(_surveyed, unit, mine, limits)
+        reading = settle_written(seen, read, *stated, limits)
         rows += rows_of(session or "", reading)
         for name, of_trials in facts.items():
             of_trials |= getattr(reading, name)
@@ -96,44 +90,6 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
                 f"{trial.path.name} is a copy of {one.path.name}: what is found in "
                 "one is no test of the other; remove one of them"
             )
-
-
-def _reading(
-    unit: Unit, trials: Sequence[Trial], seen: Sequence[TrialSamples], limits: GateLimits
-) -> SessionReading:
-    """Of the trials as ``seen``, or as they are if their forces are in another unit than N, or the
-    rate of their cameras is another than the stated one."""
-    written, masses = AS_WRITTEN, [one.mass_kg for one in seen if one.mass_kg]
-    if masses:
-        usual = Stature.of_all([one.stature for one in seen])
-        told_m = None if usual is None else usual.height_m
-        stated = unit.person.mass_kg, unit.person.height_m or told_m
-        if name := force_unit(
-            float(np.median(masses)), *stated, unit.config.ingest.mass_gross_percent
-        ):
-            written = Written(FORCE_UNITS_N[name])
-            seen = _surveyed(unit, trials, limits, written)
-    best, surely = settle_session(seen, limits), limits.corrected_percent / 100
-    now = best.log_posterior + DELAYED * len(best.delays_s)
-    most = float(np.log(surely / (1 - surely)))
-    best = replace(best, written=written)
-    for pace, odds in likely_paces([one.lengths for one in seen]).items():
-        other = replace(written, pace=pace)
-        found = settle_session(_surveyed(unit, trials, limits, other), limits)
-        gain = found.log_posterior + DELAYED * len(found.delays_s) + odds - now
-        if gain > most:
-            best, most = replace(found, written=other), gain
-    if (pace := best.written.pace) == 1.0:
-        return best
-    # Markers and forces last alike if the times of either are wrong; forces are as large as the
-    # accelerations then if it is the right one.
-    of_forces = float(expit(log_odds_of(best.of_paces, 1 / pace)))
-    if of_forces >= surely:
-        other = replace(written, force_pace=1 / pace)
-        found = settle_session(_surveyed(unit, trials, limits, other), limits)
-        return replace(found, written=other)
-    doubted = replace(best.written, probability=1 - of_forces)
-    return best if 1 - of_forces >= surely else replace(best, written=doubted)
 
 
 def _surveyed(

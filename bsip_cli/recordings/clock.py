@@ -23,7 +23,10 @@ from bsip_cli.recordings.written import OTHER_RATE, PACES
 DELAYED = -4.6
 """Logarithm: clocks differ by more than `LEAST_S` in one trial of a hundred."""
 
-LEAST_S = 0.1  # a smaller delay is left to the diagnosis, which sees it along the simulation
+LEAST_S = 0.06
+"""Half as much again as sound recordings show, see above; a smaller delay is left to the diagnosis,
+which sees it along the simulation."""
+
 _MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
 _NEAR_S = 0.1  # lags so near are one
@@ -53,7 +56,7 @@ class Lags:
     ) -> float:
         best = int(np.argmax(log_likelihood))
         logs = log_likelihood + is_large * rarely
-        near = np.abs(self.seconds - self.seconds[best]) <= _NEAR_S
+        near = is_large & (np.abs(self.seconds - self.seconds[best]) <= _NEAR_S)
         surely = np.exp(logsumexp(logs[near]) - logsumexp([*logs, 0.0]))
         is_inside = 0 < best < len(self.seconds) - 1
         if not (is_large[best] and is_inside and surely >= limits.corrected_percent / 100):

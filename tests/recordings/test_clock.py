@@ -39,7 +39,7 @@ def session_of(trial: Opened, *others: Opened):
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])
-@pytest.mark.parametrize("delay_s", [-0.65, -0.5, 0.55, 0.8, 1.3])
+@pytest.mark.parametrize("delay_s", [-0.65, 0.08, -0.5, 0.55, 0.8, 1.3])
 def test_a_delay_is_found_and_taken_off(make, delay_s):
     sound = opened(make())
     late = sound.with_forces_from(-delay_s)

@@ -23,6 +23,7 @@ Moved = Literal["", "all", "markers", "forces"]
 _SCALED, _OTHER_POINT, TURNED, MIRRORED = -3.4, -4.6, -4.6, -6.2
 # Without the forces, or these without the moments, or one channel; two that are exchanged.
 _MOMENTS_REVERSED = -6.2
+_BOTH_REVERSED = -float(np.log(2))  # rather than one of them
 _TWO_OF_SENSORS = -float(np.log(28))  # which of eight, nothing says beforehand
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
@@ -47,8 +48,8 @@ class PlateReading:
     mirrored : the corners are taken in the other direction round.
     sign : -1 where the numbers are the action on the plate.
     place_of : the plate whose place (C3D), or points (MOT), belong to this one's force and moment.
-    channels : what is wrong with single channels, as written: "reversed" and one name, "exchanged"
-        and two; "" if nothing. Names are CHANNELS, or a plate's own where these are others.
+    channels : what is wrong with single channels, as written: "reversed" and one name or two,
+        "exchanged" and two; "" if nothing. Names are CHANNELS, or a plate's own where they differ.
     half_size_m : half the outline's sides where the stated outline is too small.
     """
 
@@ -69,6 +70,7 @@ class PlateReading:
         return (
             _SCALED * scaled
             + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.channels))
+            + _BOTH_REVERSED * (self.channels.startswith("reversed") and " and " in self.channels)
             + _TWO_OF_SENSORS * any(n in CHANNELS_OF[3] for n in self.channels.split())
             + _OTHER_POINT * (self.about != "stated")
             + TURNED * (self.turn != 0 and not self.mirrored)
@@ -79,7 +81,8 @@ class PlateReading:
         """To what the channels of these names are from what is written as such, (k, k)."""
         right = np.eye(len(names))
         named = [k for k, name in enumerate(names) if name in self.channels.split()]
-        right[named] = -right[named] if len(named) == 1 else right[named[::-1]]
+        is_sign = self.channels.startswith("reversed")
+        right[named] = -right[named] if is_sign else right[named[::-1]]
         return right
 
     def measured_matrix(self, kind: int) -> np.ndarray:
@@ -118,9 +121,11 @@ ALIKE = dict.fromkeys((2, 4), (CHANNELS[:3], CHANNELS[3:])) | {
 
 
 def faults_of_channels(alike: Sequence[Sequence[str]]) -> list[str]:
-    """One of CHANNELS reversed; any two that are alike exchanged."""
+    """One of CHANNELS reversed, or both level forces; any two that are alike exchanged."""
     pairs = (pair for names in alike for pair in combinations(names, 2))
+    level = alike[0][:2]
     return [
+        f"reversed {level[0]} and {level[1]}",
         *(f"reversed {name}" for name in CHANNELS),
         *(f"exchanged {one} and {other}" for one, other in pairs),
     ]

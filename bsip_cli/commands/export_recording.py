@@ -406,9 +406,10 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
 
 
 def _rows_of(cause: Cause, told: pd.DataFrame) -> pd.DataFrame:
-    """What the diagnosis says of a cause, a row for each number."""
+    """What the diagnosis says of a cause, a row for each number; what is known from the laboratory
+    may be rejected as this person's own."""
     key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
-    return told[(told[[*key]] == pd.Series(key)).all(axis=1)]
+    return told[(told[[*key]] == pd.Series(key)).all(axis=1) & (told["verdict"] != "rejected")]
 
 
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:

@@ -77,10 +77,12 @@ class Study:
         *causes: tuple[str, str, list[float]],
         alike: Sequence = (),
         numbers: tuple[Number, ...] = (),
+        rejected: Sequence[Number] = (),
         looked_at: Sequence[str] = (STEM, STATIC),
         concerned: Sequence[str] = (STEM,),
     ) -> None:
-        """``alike``: effect and target of what cannot be told from the causes."""
+        """``alike``: effect and target of what cannot be told from the causes. ``rejected``: other
+        sizes of them."""
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
         none = nothing(0.01, (STEM,))
@@ -89,7 +91,11 @@ class Study:
             replace(none, effect=effect, target=target, **said)
             for effect, target in (group if alike or numbers else ())
         )
-        table = rows_of(tuple(findings), ())
+        hardly = (
+            replace(none, effect=effect, target=target, numbers=(one,), verdict="rejected")
+            for (effect, target, _), one in zip(causes, rejected, strict=False)
+        )
+        table = rows_of((*findings, *hardly), ())
         facts = [
             {
                 "effect": effect,
@@ -434,6 +440,16 @@ def test_the_size_is_said_with_its_interval(hide, capsys):
     assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
     entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
     assert said in entry
+
+
+def test_the_size_that_is_said_is_not_a_rejected_one(hide, capsys):
+    """What the laboratory has is looked for in each person once more, and not found."""
+    study = hide(GAIN[0])
+    found, other = Number("gain", "1", 0.06, 0.0552, 0.0657), Number("gain", "1", 0.01, 0.0, 0.1)
+    study.diagnosed_as(GAIN[1], numbers=(found,), rejected=[other])
+    study.exported()
+    said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
+    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

@@ -29,7 +29,7 @@ from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
-from bsip_cli.effects.plates import ALL, loaded_plates
+from bsip_cli.effects.plates import ALL, PlateZero, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -41,6 +41,7 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.read import delay_words
 from bsip_cli.recordings.settle import Verdict
+from bsip_cli.recordings.zero import is_noticed
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
@@ -151,10 +152,13 @@ class _Correction:
         exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
         self._swaps = list(pairs.itertuples(index=False, name=None))
+        # what the plates read without load, which ingest takes off
+        zeros = unit.facts("wrench").get("zeros", {})
+        self._zeros = {name: np.array(x) for name, x in zeros.items() if name in self._plates}
         self.causes: dict[Cause, str] = {}  # and what else it may be
         self._told = told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in causes_here(unit, [*self._plates]):
+        for cause in causes_here(unit, [*self._plates], [*self._zeros]):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
@@ -211,6 +215,7 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
+            *(_zero_words(*one) for one in self._zeros.items() if is_noticed(one[1])),
             *(_words(*one, scene, self._told) for one in self.causes.items() if scene is not None),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
@@ -287,13 +292,17 @@ class _Correction:
         wrench = source.parts() @ source.matrix(reading).T
         return np.where(source.usable[:, None], wrench, np.nan)
 
+    def _understood(self, name: str) -> np.ndarray:
+        """(N, 6) of a plate as the diagnosis saw it."""
+        return self._wrench(name, self._plates[name]) - self._zeros.get(name, np.zeros(6))
+
     @cached_property
     def _scene(self) -> Scene:
         """Plates at the rate of their samples; their faults ask nothing of the motion."""
         unit, recording = self.unit, self._opened.recording
         table = unit.read("wrench")
         plates = tuple(
-            replace(plate, wrench=self._wrench(plate.name, self._plates[plate.name]))
+            replace(plate, wrench=self._understood(plate.name))
             for plate in plates_of(unit.read("plates"), table)
             if plate.name in self._plates
         )
@@ -311,7 +320,9 @@ class _Correction:
         stamps = self._stamps(before)
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
-            wanted = corrected.get(name, self._wrench(name, reading))
+            wanted = corrected.get(name, self._understood(name))
+            zero = self._zeros.get(name, np.zeros(6))
+            wanted = wanted if is_noticed(zero) else wanted + zero
             for about, back in self._turns(markers=False):
                 force = wanted[:, :3] @ back.T
                 moment = (wanted[:, 3:] - np.cross(about, wanted[:, :3])) @ back.T
@@ -363,11 +374,12 @@ def is_corrected(cause: Cause) -> bool:
     return is_of_the_forces(cause) or isinstance(cause.effect, Turned)
 
 
-def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
+def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -> list[Cause]:
     """What the diagnosis names in a recording, on the plates that it has.
 
     Where it did not look at it: what it names of the instruments in all others of the session, at
-    least two, and what the laboratory of the person is known to have.
+    least two, and what the laboratory of the person is known to have, but for offsets of plates
+    whose zero this recording shows (``zeroed``).
     """
     looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
     here = [one for one in causes if unit.name in one.trials]
@@ -389,8 +401,16 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
             values = sizes["estimate"].to_numpy()
             cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
             shared.append(cause)
-    there = ("", ALL, *plates)
-    return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
+    there = {"", ALL, *plates}
+    return [
+        *here,
+        *(
+            one
+            for one in shared
+            if one.target.split(" ")[0]
+            in (there - {*zeroed} if isinstance(one.effect, PlateZero) else there)
+        ),
+    ]
 
 
 def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
@@ -431,6 +451,11 @@ def _stated(reading: PlateReading) -> PlateReading:
     return replace(
         reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
     )
+
+
+def _zero_words(name: str, zero: np.ndarray) -> str:
+    force = ", ".join(f"{x:.1f}" for x in zero[:3])
+    return f"plate {name}: its reading without load, ({force}) N, taken off"
 
 
 def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:

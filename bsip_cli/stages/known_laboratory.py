@@ -12,7 +12,13 @@ import pandas as pd
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
-from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, Information, with_known
+from bsip_cli.diagnosis.shared_faults import (
+    OF_A_LABORATORY,
+    Coordinate,
+    Information,
+    shared_targets,
+    with_known,
+)
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.running.unit import Unit
@@ -40,7 +46,7 @@ class Known:
         named = self.rows[self.rows["verdict"] == "named"]
         for (name, target), rows in named.groupby(["effect", "target"], sort=False):
             effect, first = EFFECTS[str(name)], rows.iloc[0]
-            held = [one for one in trials if target in effect.targets(one.scene)]
+            held = [one for one in trials if str(target) in shared_targets(effect, one.scene)]
             if held:
                 columns = ["parameter", "unit", "estimate", "ci_low", "ci_high"]
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))

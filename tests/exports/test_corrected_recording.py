@@ -387,6 +387,47 @@ def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path,
     assert "Nm" in units and "Nmm" not in units
 
 
+def lifted(path: Path) -> None:
+    """Nobody on plate 2 in the first second of the squat: it reads an offset alone."""
+    if path.stem == STEM:
+        c3d = ezc3d.c3d(str(path))
+        channels = np.asarray(c3d["parameters"]["FORCE_PLATFORM"]["CHANNEL"]["value"])[:, 1] - 1
+        noise = np.random.default_rng(0).normal(0.0, 0.5, (len(channels), 250))
+        c3d["data"]["analogs"][0, channels.astype(int), :250] = noise
+        c3d["data"]["analogs"][:, int(channels[2])] += 12.0
+        c3d.write(str(path))
+
+
+def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
+    study = hide(change=lifted)
+    study.diagnosed_as()
+    path = study.exported()
+    said = capsys.readouterr().err
+    assert f"{STEM}: corrected: plate 2: its reading without load, (" in said
+    assert said.count("its reading without load") == 1
+    before = wrenches(read_recording(study.made.study / "sub-01" / path.name))
+    after = wrenches(read_recording(path))
+    taken = before - after
+    assert np.allclose(taken[0], 0.0, atol=1e-4)
+    assert np.allclose(np.abs(taken[1, :, 2]), 12.0, atol=0.1)
+    assert np.abs(np.median(after[1, :250], axis=0)).max() < 0.1
+
+
+def test_a_zero_is_not_taken_off_for_what_the_others_of_the_session_have():
+    trials = [SimpleNamespace(stem=stem, session="") for stem in "ABC"]
+    cause = {"effect": "plate_zero", "target": "1 fz", "trials": ["A", "B"], "verdict": "named"}
+    facts = {"causes": [cause | {"values": [9.0], "folds": [[9.0]]}], "trials": ["A", "B"]}
+    unit = SimpleNamespace(
+        name="C",
+        own_trial=trials[2],
+        person=SimpleNamespace(id="sub-01", trials=trials),
+        facts=lambda kind: facts,
+        has=lambda kind: False,
+    )
+    assert len(causes_here(unit, ["1", "2"], zeroed=["2"])) == 1
+    assert not causes_here(unit, ["1", "2"], zeroed=["1"])
+
+
 def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
     study = hide(GAIN[0])
     study.diagnosed_as(("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0]))

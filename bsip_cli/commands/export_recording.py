@@ -455,7 +455,7 @@ def _stated(reading: PlateReading) -> PlateReading:
 
 def _zero_words(name: str, zero: np.ndarray) -> str:
     force = ", ".join(f"{x:.1f}" for x in zero[:3])
-    return f"plate {name}: its reading without load, ({force}) N, taken off"
+    return f"plate {name}: its reading without load, ({force}) N, subtracted"
 
 
 def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:

@@ -20,7 +20,7 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
-from bsip_cli.commands.export_recording import causes_here
+from bsip_cli.commands.export_recording import _why_left, causes_here
 from bsip_cli.diagnosis.findings import Number
 from bsip_cli.instruments.c3d_plates import wired_plates
 from bsip_cli.recordings.model import Recording
@@ -81,21 +81,24 @@ class Study:
         looked_at: Sequence[str] = (STEM, STATIC),
         concerned: Sequence[str] = (STEM,),
     ) -> None:
-        """``alike``: effect and target of what cannot be told from the causes. ``rejected``: other
-        sizes of them."""
+        """``alike``: effect and target of what cannot be told from the causes. ``numbers`` and
+        ``rejected``: sizes of them that are named and rejected, one of each."""
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
         none = nothing(0.01, (STEM,))
-        said = {"class_id": "A"} if alike else {"numbers": numbers}
         findings = (
-            replace(none, effect=effect, target=target, **said)
-            for effect, target in (group if alike or numbers else ())
+            replace(none, effect=effect, target=target, class_id="A" if alike else "")
+            for effect, target in (group if alike else ())
+        )
+        sized = (
+            replace(none, effect=effect, target=target, numbers=(one,))
+            for (effect, target, _), one in zip(causes, numbers, strict=False)
         )
         hardly = (
             replace(none, effect=effect, target=target, numbers=(one,), verdict="rejected")
             for (effect, target, _), one in zip(causes, rejected, strict=False)
         )
-        table = rows_of((*findings, *hardly), ())
+        table = rows_of((*findings, *sized, *hardly), ())
         facts = [
             {
                 "effect": effect,
@@ -491,6 +494,37 @@ def test_the_size_that_is_said_is_not_a_rejected_one(hide, capsys):
     study.exported()
     said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
     assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
+
+
+def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(hide, capsys):
+    """The same fault twice, in the same trials, with two sizes."""
+    study = hide(GAIN[0])
+    larger, smaller = (*GAIN[1][:2], [0.04]), (*GAIN[1][:2], [0.02])
+    both_sizes = Number("gain", "1", 0.04, 0.03, 0.05), Number("gain", "1", 0.02, 0.01, 0.03)
+    study.diagnosed_as(larger, smaller, numbers=both_sizes)
+    study.exported()
+    said = capsys.readouterr().err
+    for size in ("4.0 % (95 % interval 3.0 to 5.0)", "2.0 % (95 % interval 1.0 to 3.0)"):
+        assert f"{STEM}: corrected: plate_gain 1 fz: gain {size} taken off" in said
+
+
+def test_the_size_that_is_told_is_taken_off(hide):
+    """``extend`` leaves a person's own recordings out of what the laboratory tells; the sentence
+    does not."""
+    study = hide(GAIN[0])
+    own = (*GAIN[1][:2], [0.07])
+    study.diagnosed_as(own, numbers=(Number("gain", "1", 0.06, 0.05, 0.07),))
+    before, after = both(study, study.exported())
+    assert np.abs(wrenches(after) - wrenches(before))[..., :3].max() < 0.05
+
+
+def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("marker_shift", "T10")])
+    study.exported()
+    assert "marker_shift T10: one of several causes" in capsys.readouterr().err
+    assert _why_left("marker_shift", "unknown").startswith("no fault of the plates")
+    assert _why_left("marker_swap", "unknown") == _why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

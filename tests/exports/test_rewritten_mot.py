@@ -15,7 +15,15 @@ SAID = ["bsip 1: corrected; before: sha256 ab12", "delay 9 ms (95 % interval 8 t
 MORE = np.array([0.0, 20.0, 0.0, 1.0, 0.0, 2.0])
 
 
-def rewritten(tmp_path) -> tuple[Path, np.ndarray, np.ndarray]:
+def heavier(before):
+    return replace(before, readings=before.readings + MORE)
+
+
+def aside(before):
+    return replace(before, points_m=before.points_m + 0.01)
+
+
+def rewritten(tmp_path, change=heavier) -> tuple[Path, np.ndarray, np.ndarray]:
     """The TRC file's copy, and the force and torque before."""
     times, rng = np.arange(COUNT) / 100, np.random.default_rng(3)
     force = rng.normal([5.0, 700.0, -3.0], 2.0, (COUNT, 3))
@@ -31,12 +39,9 @@ def rewritten(tmp_path) -> tuple[Path, np.ndarray, np.ndarray]:
     body = [f"{k + 1}\t{t:.5f}\t0.1\t1.0\t0.2" for k, t in enumerate(times)]
     (tmp_path / "in.trc").write_text(head + "\n".join([*body, ""]))
 
-    def heavier(before):
-        return replace(before, readings=before.readings + MORE)
-
     copy = tmp_path / "new" / "in.trc"
     copy.parent.mkdir()
-    rewrite_trc_mot(tmp_path / "in.trc", copy, heavier, SAID)
+    rewrite_trc_mot(tmp_path / "in.trc", copy, change, SAID)
     return copy, force, torque
 
 
@@ -46,6 +51,16 @@ def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
     assert np.allclose(found[:, 1:4], force + MORE[:3], atol=1e-5)
     assert np.allclose(found[:, 4:7], PLACE)
     assert np.allclose(found[:, 7:], torque + MORE[3:], atol=1e-5)
+
+
+def test_what_is_done_to_markers_alone_is_told_beside_the_forces(tmp_path):
+    copy = rewritten(tmp_path, aside)[0]
+    before, after = (
+        p.read_text().splitlines() for p in (tmp_path / "in.mot", copy.with_suffix(".mot"))
+    )
+    end = before.index("endheader")
+    assert after == [*before[:end], *SAID, *before[end:]]
+    assert copy.read_text() != (tmp_path / "in.trc").read_text()
 
 
 def test_opensim_reads_the_rewritten_files(tmp_path):

@@ -353,7 +353,7 @@ def _chosen(unit: Unit) -> tuple[str, str]:
     path = unit.path("choice")
     if not path.exists() or not is_made_from(path, unit.path("identification")):
         raise UsageError(
-            "says not which parameters to use, or of an earlier identification",
+            "is missing, or of an earlier identification",
             file=path,
             expected="the result of `bsip choose`",
             remedy="run `bsip choose` or `bsip run`, or name a method with --method",

@@ -21,15 +21,14 @@ from bsip_cli.diagnosis.cause import (
     corrected_plates,
     delay_by,
     is_fault_of_forces,
-    is_of_the_forces,
 )
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.clocks import Delay
-from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
-from bsip_cli.effects.plates import ALL, loaded_plates
+from bsip_cli.effects.plates import ALL, PlateZero, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -41,6 +40,7 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.read import delay_words
 from bsip_cli.recordings.settle import Verdict
+from bsip_cli.recordings.zero import is_noticed
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
@@ -68,6 +68,8 @@ _READER = Stage(
 )
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
 _AT_ONCE_S = 1e-9
+_NO_INTERVAL = np.full((1, 2), np.nan)
+_NO_FAULT_OF_IT = "no fault of the plates, the clocks, the axes or the labels"
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
 
@@ -151,20 +153,26 @@ class _Correction:
         exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
         self._swaps = list(pairs.itertuples(index=False, name=None))
+        # what the plates read without load, which ingest takes off
+        zeros = unit.facts("wrench").get("zeros", {})
+        self._zeros = {name: np.array(x) for name, x in zeros.items() if name in self._plates}
         self.causes: dict[Cause, str] = {}  # and what else it may be
         self._told = told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in causes_here(unit, [*self._plates]):
+        for cause in causes_here(unit, [*self._plates], [*self._zeros]):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
             known |= {(cause.effect.name, cause.target), *alike}
-            others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
+            others = " or ".join(
+                "what acts like it and has no name"
+                if effect == UNEXPLAINED
+                else f"{effect} {target}".strip()
+                for effect, target in alike
+            )
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
             elif not is_corrected(cause):
-                self.left.append(
-                    f"{words}: no fault of the plates, the clocks, the axes or the labels"
-                )
+                self.left.append(f"{words}: {_NO_FAULT_OF_IT}")
             elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
                 self.left.append(f"{words}: no plate shows where the axes are")
             elif alike and not all(
@@ -173,11 +181,10 @@ class _Correction:
             ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
-                self.causes[cause] = others
+                self.causes[self._as_told(cause)] = others
         here = _said_of(unit.name, told, [*EFFECTS])
         self.left += dict.fromkeys(
-            f"{effect} {target}".strip()
-            + (": one of several causes that look alike" if group else ": its size is not known")
+            f"{effect} {target}".strip() + f": {_why_left(effect, 'its size is not known', group)}"
             for effect, target, group in here[["effect", "target", "class_id"]].to_numpy()
             if (effect, target) not in known
         )
@@ -188,7 +195,7 @@ class _Correction:
         )
         about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
         self.left += dict.fromkeys(
-            f"{sentence}: no size of it is known for this recording"
+            f"{sentence}: {_why_left(effect, 'no size of it is known for this recording')}"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
             if (effect, target) not in known
             and target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
@@ -199,6 +206,15 @@ class _Correction:
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
         ]
         self.left += [f"{words}: bsip reads the file so" for words in kept if words]
+
+    def _as_told(self, cause: Cause) -> Cause:
+        """With the sizes that the diagnosis tells, of the laboratory those by all its persons: for
+        ``extend`` a person's own recordings are left out of them."""
+        told = _rows_of(cause, self._told).set_index("parameter")["estimate"]
+        names = [one.name for one in cause.effect.parameters(self._scene, cause.target)]
+        if not told.index.is_unique or not {*names} <= {*told.index}:
+            return cause
+        return replace(cause, values=told[names].to_numpy())
 
     @property
     def said(self) -> list[str]:
@@ -211,6 +227,7 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
+            *(_zero_words(*one) for one in self._zeros.items() if is_noticed(one[1])),
             *(_words(*one, scene, self._told) for one in self.causes.items() if scene is not None),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
@@ -287,13 +304,17 @@ class _Correction:
         wrench = source.parts() @ source.matrix(reading).T
         return np.where(source.usable[:, None], wrench, np.nan)
 
+    def _understood(self, name: str) -> np.ndarray:
+        """(N, 6) of a plate as the diagnosis saw it."""
+        return self._wrench(name, self._plates[name]) - self._zeros.get(name, np.zeros(6))
+
     @cached_property
     def _scene(self) -> Scene:
         """Plates at the rate of their samples; their faults ask nothing of the motion."""
         unit, recording = self.unit, self._opened.recording
         table = unit.read("wrench")
         plates = tuple(
-            replace(plate, wrench=self._wrench(plate.name, self._plates[plate.name]))
+            replace(plate, wrench=self._understood(plate.name))
             for plate in plates_of(unit.read("plates"), table)
             if plate.name in self._plates
         )
@@ -311,7 +332,9 @@ class _Correction:
         stamps = self._stamps(before)
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
-            wanted = corrected.get(name, self._wrench(name, reading))
+            wanted = corrected.get(name, self._understood(name))
+            zero = self._zeros.get(name, np.zeros(6))
+            wanted = wanted if is_noticed(zero) else wanted + zero
             for about, back in self._turns(markers=False):
                 force = wanted[:, :3] @ back.T
                 moment = (wanted[:, 3:] - np.cross(about, wanted[:, :3])) @ back.T
@@ -360,14 +383,29 @@ class _Correction:
 
 def is_corrected(cause: Cause) -> bool:
     """Of the plates, the clocks, or the axes of laboratory and cameras."""
-    return is_of_the_forces(cause) or isinstance(cause.effect, Turned)
+    return _can_be_corrected(cause.effect)
 
 
-def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
+def _can_be_corrected(effect: Effect) -> bool:
+    return is_fault_of_forces(effect) or isinstance(effect, Turned)
+
+
+def _why_left(effect: str, unknown: str, group: str = "") -> str:
+    """Why what has no cause in the facts is not corrected. group : in which it is one of several;
+    unknown : what is said of a fault that could be corrected."""
+    if group:
+        return "one of several causes that look alike"
+    known = EFFECTS.get(effect)
+    can_be = known is not None and (_can_be_corrected(known) or isinstance(known, MarkerSwap))
+    return unknown if can_be else _NO_FAULT_OF_IT
+
+
+def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -> list[Cause]:
     """What the diagnosis names in a recording, on the plates that it has.
 
     Where it did not look at it: what it names of the instruments in all others of the session, at
-    least two, and what the laboratory of the person is known to have.
+    least two, and what the laboratory of the person is known to have, but for offsets of plates
+    whose zero this recording shows (``zeroed``).
     """
     looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
     here = [one for one in causes if unit.name in one.trials]
@@ -389,8 +427,16 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
             values = sizes["estimate"].to_numpy()
             cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
             shared.append(cause)
-    there = ("", ALL, *plates)
-    return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
+    there = {"", ALL, *plates}
+    return [
+        *here,
+        *(
+            one
+            for one in shared
+            if one.target.split(" ")[0]
+            in (there - {*zeroed} if isinstance(one.effect, PlateZero) else there)
+        ),
+    ]
 
 
 def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
@@ -406,9 +452,10 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
 
 
 def _rows_of(cause: Cause, told: pd.DataFrame) -> pd.DataFrame:
-    """What the diagnosis says of a cause, a row for each number."""
+    """What the diagnosis says of a cause, a row for each number; what is known from the laboratory
+    may be rejected as this person's own."""
     key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
-    return told[(told[[*key]] == pd.Series(key)).all(axis=1)]
+    return told[(told[[*key]] == pd.Series(key)).all(axis=1) & (told["verdict"] != "rejected")]
 
 
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
@@ -432,13 +479,22 @@ def _stated(reading: PlateReading) -> PlateReading:
     )
 
 
+def _zero_words(name: str, zero: np.ndarray) -> str:
+    force = ", ".join(f"{x:.1f}" for x in zero[:3])
+    return f"plate {name}: its reading without load, ({force}) N, subtracted"
+
+
 def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:
     """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
     readers of C3D know."""
-    values, rows = [], _rows_of(cause, told).set_index("parameter")
+    values, rows = [], _rows_of(cause, told)
     for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
         factor, readable = readable_unit(name, unit)
-        low, high = factor * rows.reindex([name])[["ci_low", "ci_high"]].to_numpy()[0]
+        mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's beside it
+        nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
+        low, high = (
+            factor * (nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL)[0]
+        )
         size, interval = f"{factor * value:.3g}", ""
         if high > low:
             size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))

@@ -17,6 +17,7 @@ from bsip_cli.diagnosis.fault_model import SIZES, FaultTrial, Fitted, Session
 from bsip_cli.diagnosis.hypothesis import Candidate, candidates_of
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.scene import Scene
 
 _BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
 _BATCH = 60  # candidates whose signatures are filtered at a time
@@ -85,7 +86,8 @@ def library_of(
     """alone : trials in which a fault may be by itself; in the others only what lasts is asked.
     prior_odds : of one more fault in a person's recordings against none."""
     columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
-    places = tuple(_places(parts, alone))
+    scenes = [one.scene for one in session.trials]
+    places = tuple(_places(parts, scenes, alone))
     return Library(columns, parts, places, prior_odds, _log_prior(places, prior_odds))
 
 
@@ -110,16 +112,20 @@ def _signatures(
     return columns, parts
 
 
-def _places(parts: Sequence[dict[Candidate, slice]], alone: Sequence[int]) -> Iterator[Place]:
+def _places(
+    parts: Sequence[dict[Candidate, slice]], scenes: Sequence[Scene], alone: Sequence[int]
+) -> Iterator[Place]:
     held = Counter(c for one in parts for c in one)
     for t in alone:
         for candidate in parts[t]:
             if held[candidate] == 1 or not candidate.effect.of_the_body:
                 yield Place(candidate, (t,))
     for candidate in dict.fromkeys(c for one in parts for c in one):
-        asked = alone if candidate.effect.while_moving else range(len(parts))
-        holding = tuple(t for t in asked if candidate in parts[t])
-        if candidate.effect.lasts and len(holding) > 1:
+        effect, target = candidate.effect, candidate.target
+        asked = alone if effect.while_moving else range(len(parts))
+        held_in = (t for t in asked if candidate in parts[t])
+        holding = tuple(t for t in held_in if effect.is_shared(scenes[t], target))
+        if effect.lasts and len(holding) > 1:
             yield Place(candidate, holding)
 
 

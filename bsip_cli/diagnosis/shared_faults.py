@@ -75,6 +75,11 @@ class SharedTrial(FaultTrial):
         return as_simulated(self.scene)
 
 
+def shared_targets(effect: Effect, scene: Scene) -> list[str]:
+    """Where a trial has a fault that all have."""
+    return [one for one in effect.targets(scene) if effect.is_shared(scene, one)]
+
+
 def inner(scene: Scene) -> Scene:
     """The trial, its valid frames as far from the others as these reach by a delay and a filter."""
     margin = max(1, round(_MARGIN_S * scene.rate_hz))
@@ -115,7 +120,7 @@ def with_known(
     scene, filter_ = as_simulated(trial.scene), trial.errors.filter
     columns = np.zeros((*trial.errors.residual.shape, len(coordinates)))
     for effect in OF_A_LABORATORY:
-        for target in effect.targets(trial.scene):
+        for target in shared_targets(effect, trial.scene):
             parameters = effect.parameters(trial.scene, target)
             mine = [Coordinate(effect.name, target, p.name, standing) for p in parameters]
             if mine[0] in coordinates:
@@ -135,7 +140,7 @@ def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothes
     together."""
     found = []
     for effect in _ASKED:
-        targets = [effect.targets(one.scene) for one in trials]
+        targets = [shared_targets(effect, one.scene) for one in trials]
         for target in dict.fromkeys(name for mine in targets for name in mine):
             if target.split(" ")[0] == ALL:
                 continue

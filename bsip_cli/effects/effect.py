@@ -70,6 +70,10 @@ class Effect(ABC):
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""
         return ("",)
 
+    def is_shared(self, scene: Scene, target: str) -> bool:
+        """Whether a trial has it at a target if the others have."""
+        return True
+
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         """Its numbers, in the order in which ``change`` takes them."""
         return self.numbers

@@ -127,6 +127,9 @@ class PlateZero(OwnCourse):
     looks = "a constant difference in one channel, with and without load"
     remedy = "step off the plate for five seconds"
 
+    def is_shared(self, scene: Scene, target: str) -> bool:
+        return not plate_of(scene, target.split(" ")[0]).zeroed
+
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         _, unit = self._reads(target)
         bounds = (-200.0, 200.0, 10.0) if unit == "N" else (-100.0, 100.0, 5.0)

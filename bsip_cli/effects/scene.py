@@ -33,12 +33,14 @@ class Plate:
     corners_m : (4, 3) in the world, in the file's order: x runs from the second to the first.
     wrench : (N, 6) on the body, about the world's origin; NaN where there is none.
     sensor_m : (3,) the point that its moments are about; the middle of its surface if unknown.
+    zeroed : whether what it read without load in this trial has been taken off.
     """
 
     name: str
     corners_m: np.ndarray
     wrench: np.ndarray
     sensor_m: np.ndarray | None = None
+    zeroed: bool = False
 
     def centre_m(self) -> np.ndarray:
         """(3,) middle of the surface."""

@@ -45,7 +45,7 @@ def rewrite_trc_mot(
 ) -> Instruments:
     """Write copies of a TRC file and of the MOT file beside it with other readings.
 
-    A file that does not change is copied as it is.
+    A file that does not change is copied as it is, but for what the MOT's header says.
 
     copy : the TRC file to be written; the MOT file goes beside it. said : what the header of the
         MOT says of the change, a line each.
@@ -67,7 +67,7 @@ def rewrite_trc_mot(
     _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
     _write(
         copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
-        _new_mot(forces, sets, before, after, said) if loaded else mot.read_bytes(),
+        _new_mot(forces, sets, before, after, said) if loaded else _same_mot(mot, forces, said),
     )
     return after
 
@@ -272,6 +272,15 @@ def _new_mot(
     head[-2:-2] = said  # before the line endheader and the names
     rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]
     return "\n".join([*head, *rows]) + "\n"
+
+
+def _same_mot(mot: Path, table: Table, said: Sequence[str]) -> str | bytes:
+    """Other markers alone are told there as well: a TRC file has no place for it."""
+    if not said:
+        return mot.read_bytes()
+    lines = _lines(mot)
+    lines[len(table.head) - 2 : len(table.head) - 2] = said
+    return "\n".join(lines) + "\n"
 
 
 def _cell(value: float) -> str:

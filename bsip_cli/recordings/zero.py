@@ -11,6 +11,7 @@ from bsip_cli.recordings.analog import long_runs, runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plates import LOADED_N
 
+_NOTICED_N = 1.0
 _WINDOW_S = 0.2
 _LEAST_S = 0.4
 _LARGEST_N = 45.0
@@ -58,6 +59,11 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
     return _zero_of(plate, unloaded, rate_hz)
 
 
+def is_noticed(offset: np.ndarray) -> bool:
+    """Whether what a plate reads without load, (6,), is more than rounding and noise."""
+    return bool(np.abs(offset[:3]).max() > _NOTICED_N)
+
+
 def steady_pull(plate: Plate, rate_hz: float) -> np.ndarray:
     """Samples at which it pulls most, and hardly changes for long, (n_analog,) bool."""
     width = max(1, round(0.25 * _PULLED_S * rate_hz))
@@ -84,7 +90,7 @@ def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
         seconds = sum(stop - start for start, stop in zero.stretches_s)
         force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])
         found, action = f"({force}) N in {seconds:.1f} s without load", "subtracted it"
-        level = "corrected" if np.abs(zero.offset[:3]).max() > 1.0 else "info"
+        level = "corrected" if is_noticed(zero.offset) else "info"
         force_N, moment_Nm = plate.force_N - zero.offset[:3], plate.moment_Nm - zero.offset[3:]
         plate = replace(plate, force_N=force_N, moment_Nm=moment_Nm)
     return plate, Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)

@@ -23,7 +23,9 @@ from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
 _LOADS = "correct [[loads]] in study.toml"
-_NAME = r"sub-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*"  # of a person or a recording
+_PART = "_(ses|task|tracksys|run)-"
+_NAME = rf"sub-[A-Za-z0-9]+({_PART}[A-Za-z0-9]+)*"  # of a person or a recording
+_IN_A_PATH = rf"(?<=/){_NAME}|{_NAME}(?=[/_.][A-Za-z])(?!{_PART})"  # or of a file
 _BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed} gone, about {remaining} left"
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
@@ -187,7 +189,8 @@ class _Voice:
     def tell(self, outcome: Outcome) -> None:
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
-            alike = self.told.setdefault((outcome.stage, re.sub(_NAME, "it", sentence)), [])
+            general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
+            alike = self.told.setdefault((outcome.stage, general), [])
             if is_finding or not alike:
                 _say(outcome, sentence)
             whose = re.search(_NAME, sentence)

@@ -56,8 +56,9 @@ def run(unit: Unit) -> None:
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
     findings = [*recording.findings, *told, *paired, *match.findings, *repeats]
+    zeros: dict[str, list[float]] = {}
     if unit.config.ingest.zero_unloaded_plates:
-        recording, zeroed = _without_zero(recording)
+        recording, zeroed, zeros = _without_zero(recording)
         findings += zeroed
     segment = {marker.label: marker.segment for marker in marker_set.markers}
     segments = [segment[name] for name in names]
@@ -87,7 +88,7 @@ def run(unit: Unit) -> None:
     times = recording.time_s()
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
-    known = {"mass_stretches": [one.record() for one in stretches]}
+    known = {"mass_stretches": [one.record() for one in stretches], "zeros": zeros}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
     corners = [
         {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
@@ -101,12 +102,20 @@ def run(unit: Unit) -> None:
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
-def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
+def _without_zero(
+    recording: Recording,
+) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
+    """The plates without what they read without load, and that, (6,) by plate: N and N m about the
+    world's origin."""
     done, rate_hz = [], recording.analog_rate_hz
+    zeros = {}
     for plate in recording.plates:
         zero = plate_zero(plate, rate_hz, surely_free=nobody_near(recording, plate))
         done.append(subtract_zero(plate, zero))
-    return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
+        if zero.is_known():
+            zeros[plate.name] = zero.offset.tolist()
+    zeroed = replace(recording, plates=tuple(plate for plate, _ in done))
+    return zeroed, [finding for _, finding in done], zeros
 
 
 def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:

@@ -12,13 +12,21 @@ import pandas as pd
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
-from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, Information, with_known
+from bsip_cli.diagnosis.shared_faults import (
+    OF_A_LABORATORY,
+    Coordinate,
+    Information,
+    shared_targets,
+    with_known,
+)
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record
 
 _KEY = ("effect", "target", "parameter", "standing")
+_ROUNDING = 1e-10  # of the largest variance
 _FAULTS = {one.name for one in OF_A_LABORATORY}
 
 
@@ -40,7 +48,7 @@ class Known:
         named = self.rows[self.rows["verdict"] == "named"]
         for (name, target), rows in named.groupby(["effect", "target"], sort=False):
             effect, first = EFFECTS[str(name)], rows.iloc[0]
-            held = [one for one in trials if target in effect.targets(one.scene)]
+            held = [one for one in trials if str(target) in shared_targets(effect, one.scene)]
             if held:
                 columns = ["parameter", "unit", "estimate", "ci_low", "ci_high"]
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
@@ -59,8 +67,8 @@ class Known:
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
-        and the clock as the others alone tell them."""
-        sizes = dict(zip(self.coordinates, self.mean.tolist(), strict=True))
+        and the clock as the others alone tell them, who have no other fault."""
+        sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))
         for found in self.findings(trials):
             parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
             mine = [
@@ -70,6 +78,27 @@ class Known:
             ]
             yield cause_record(found.effect, found.target, found.trials, np.array(mine))
 
+    def _given_no_other(self) -> np.ndarray:
+        """(C,) likeliest sizes [typical] where all but what is named is zero: some faults offset
+        each other, and one of them alone, of the size that it has beside the rest, is none."""
+        named = self.rows[self.rows["verdict"] == "named"]
+        faults = set(zip(named["effect"], named["target"], strict=True))
+        if (PlateRotation.name, ALL) in faults:  # about a middle, so each plate is shifted too
+            faults.add((PlateTranslation.name, ALL))
+        kept = np.array(
+            [
+                bool(faults & {(x.effect, x.target), (x.effect, _of_all(x.target))})
+                for x in self.coordinates
+            ]
+        )
+        covariance = self.root @ self.root.T
+        across, rest = covariance[np.ix_(kept, ~kept)], covariance[np.ix_(~kept, ~kept)]
+        mean = np.where(kept, self.mean, 0.0)
+        mean[kept] -= (
+            across @ np.linalg.pinv(rest, rcond=_ROUNDING, hermitian=True) @ self.mean[~kept]
+        )
+        return mean
+
     def limits(self, own: pd.DataFrame) -> pd.DataFrame:
         """Of ``detection``, those of the laboratory where all persons would show less."""
         key = ["effect", "target", "parameter"]
@@ -78,6 +107,11 @@ class Known:
         smaller = np.fmin(own["limit"].to_numpy(), theirs.reindex(both).to_numpy())
         together = own["trials"].str.count(",")
         return own.assign(limit=np.where(together == together.max(), smaller, own["limit"]))
+
+
+def _of_all(target: str) -> str:
+    """Of all plates what is of one: ``all fz`` of ``1 fz``."""
+    return " ".join([ALL, *target.split(" ")[1:]])
 
 
 def known_laboratory(unit: Unit) -> Known | None:

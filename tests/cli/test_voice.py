@@ -37,6 +37,21 @@ def test_of_the_study_it_is_said_whom_a_remark_is_of(capsys):
     assert "the same of sub-2, sub-3: participants.tsv: height_m 168 of it is in cm" in text
 
 
+def test_of_files_it_is_said_what_they_end_with(capsys):
+    outcomes = [
+        Outcome(
+            "export", name, "done", (f"{name}: out/sub-1/export: {name}_motion.mot, {name}.xml",)
+        )
+        for name in ("sub-1_task-squat_run-1", "sub-1_task-static")
+    ]
+    assert follow("export", [], (one for one in outcomes), 2, None) == 0
+    text = capsys.readouterr().err
+    first = "export: sub-1_task-squat_run-1: out/sub-1/export: sub-1_task-squat_run-1_motion.mot, "
+    assert first in text
+    others = "the same of sub-1_task-static: out/.../export: ..._motion.mot, ....xml"
+    assert f"export: {others}" in text
+
+
 def test_quiet_says_findings_and_errors_only(capsys):
     assert said(capsys, quiet=True).splitlines() == [
         "diagnose: sub-1: something is wrong",

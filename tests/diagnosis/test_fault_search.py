@@ -75,6 +75,18 @@ def test_two_faults_of_two_trials_are_both_named():
     assert names == {("plate_zero", "1 fx", ("a",)), ("sync_offset", "", ("b",))}
 
 
+def test_an_offset_of_all_trials_is_looked_for_where_ingest_has_not_taken_it_off():
+    a, b = (
+        with_effect(movement(seed, first_s), EFFECTS["plate_zero"], "1 fx", 12.0)
+        for seed, first_s in ((1, 0.0), (11, 8.0))
+    )
+    c = movement(21, 4.0)
+    c = replace(c, plates=tuple(replace(one, zeroed=True) for one in c.plates))
+    assert {(x.effect, x.target, x.trials) for x in told(found_in(a, b, c))} == {
+        ("plate_zero", "1 fx", ("a", "b"))
+    }
+
+
 def test_a_fault_gains_on_seconds_that_did_not_size_it():
     held = held_out(two_faults().fit)
     for number in range(2):

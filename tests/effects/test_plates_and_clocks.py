@@ -65,6 +65,17 @@ def scene_with(spoil) -> tuple[Scene, np.ndarray]:
     )
 
 
+def test_an_offset_is_not_shared_by_a_trial_whose_zero_was_taken_off():
+    scene = moving()
+    first, *others = scene.plates
+    zeroed = replace(scene, plates=(replace(first, zeroed=True), *others))
+    target = f"{first.name} fz"
+    assert PlateZero().is_shared(scene, target) and not PlateZero().is_shared(zeroed, target)
+    assert PlateZero().is_shared(zeroed, f"{others[0].name} fz")
+    assert PlateGain().is_shared(zeroed, target)
+    assert target in PlateZero().targets(zeroed)  # it may be wrong there for reasons of its own
+
+
 def test_the_plates_axes_are_its_own_with_z_up():
     plate = Plate("1", CORNERS, np.zeros((1, 6)))
     np.testing.assert_allclose(plate.axes(), [X, -Y, [0, 0, 1]], atol=1e-12)

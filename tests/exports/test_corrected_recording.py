@@ -20,7 +20,7 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
-from bsip_cli.commands.export_recording import causes_here
+from bsip_cli.commands.export_recording import _why_left, causes_here
 from bsip_cli.diagnosis.findings import Number
 from bsip_cli.instruments.c3d_plates import wired_plates
 from bsip_cli.recordings.model import Recording
@@ -77,19 +77,28 @@ class Study:
         *causes: tuple[str, str, list[float]],
         alike: Sequence = (),
         numbers: tuple[Number, ...] = (),
+        rejected: Sequence[Number] = (),
         looked_at: Sequence[str] = (STEM, STATIC),
         concerned: Sequence[str] = (STEM,),
     ) -> None:
-        """``alike``: effect and target of what cannot be told from the causes."""
+        """``alike``: effect and target of what cannot be told from the causes. ``numbers`` and
+        ``rejected``: sizes of them that are named and rejected, one of each."""
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
         none = nothing(0.01, (STEM,))
-        said = {"class_id": "A"} if alike else {"numbers": numbers}
         findings = (
-            replace(none, effect=effect, target=target, **said)
-            for effect, target in (group if alike or numbers else ())
+            replace(none, effect=effect, target=target, class_id="A" if alike else "")
+            for effect, target in (group if alike else ())
         )
-        table = rows_of(tuple(findings), ())
+        sized = (
+            replace(none, effect=effect, target=target, numbers=(one,))
+            for (effect, target, _), one in zip(causes, numbers, strict=False)
+        )
+        hardly = (
+            replace(none, effect=effect, target=target, numbers=(one,), verdict="rejected")
+            for (effect, target, _), one in zip(causes, rejected, strict=False)
+        )
+        table = rows_of((*findings, *sized, *hardly), ())
         facts = [
             {
                 "effect": effect,
@@ -381,6 +390,47 @@ def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path,
     assert "Nm" in units and "Nmm" not in units
 
 
+def lifted(path: Path) -> None:
+    """Nobody on plate 2 in the first second of the squat: it reads an offset alone."""
+    if path.stem == STEM:
+        c3d = ezc3d.c3d(str(path))
+        channels = np.asarray(c3d["parameters"]["FORCE_PLATFORM"]["CHANNEL"]["value"])[:, 1] - 1
+        noise = np.random.default_rng(0).normal(0.0, 0.5, (len(channels), 250))
+        c3d["data"]["analogs"][0, channels.astype(int), :250] = noise
+        c3d["data"]["analogs"][:, int(channels[2])] += 12.0
+        c3d.write(str(path))
+
+
+def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
+    study = hide(change=lifted)
+    study.diagnosed_as()
+    path = study.exported()
+    said = capsys.readouterr().err
+    assert f"{STEM}: corrected: plate 2: its reading without load, (" in said
+    assert said.count("its reading without load") == 1
+    before = wrenches(read_recording(study.made.study / "sub-01" / path.name))
+    after = wrenches(read_recording(path))
+    taken = before - after
+    assert np.allclose(taken[0], 0.0, atol=1e-4)
+    assert np.allclose(np.abs(taken[1, :, 2]), 12.0, atol=0.1)
+    assert np.abs(np.median(after[1, :250], axis=0)).max() < 0.1
+
+
+def test_a_zero_is_not_taken_off_for_what_the_others_of_the_session_have():
+    trials = [SimpleNamespace(stem=stem, session="") for stem in "ABC"]
+    cause = {"effect": "plate_zero", "target": "1 fz", "trials": ["A", "B"], "verdict": "named"}
+    facts = {"causes": [cause | {"values": [9.0], "folds": [[9.0]]}], "trials": ["A", "B"]}
+    unit = SimpleNamespace(
+        name="C",
+        own_trial=trials[2],
+        person=SimpleNamespace(id="sub-01", trials=trials),
+        facts=lambda kind: facts,
+        has=lambda kind: False,
+    )
+    assert len(causes_here(unit, ["1", "2"], zeroed=["2"])) == 1
+    assert not causes_here(unit, ["1", "2"], zeroed=["1"])
+
+
 def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
     study = hide(GAIN[0])
     study.diagnosed_as(("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0]))
@@ -434,6 +484,47 @@ def test_the_size_is_said_with_its_interval(hide, capsys):
     assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
     entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
     assert said in entry
+
+
+def test_the_size_that_is_said_is_not_a_rejected_one(hide, capsys):
+    """What the laboratory has is looked for in each person once more, and not found."""
+    study = hide(GAIN[0])
+    found, other = Number("gain", "1", 0.06, 0.0552, 0.0657), Number("gain", "1", 0.01, 0.0, 0.1)
+    study.diagnosed_as(GAIN[1], numbers=(found,), rejected=[other])
+    study.exported()
+    said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
+    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
+
+
+def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(hide, capsys):
+    """The same fault twice, in the same trials, with two sizes."""
+    study = hide(GAIN[0])
+    larger, smaller = (*GAIN[1][:2], [0.04]), (*GAIN[1][:2], [0.02])
+    both_sizes = Number("gain", "1", 0.04, 0.03, 0.05), Number("gain", "1", 0.02, 0.01, 0.03)
+    study.diagnosed_as(larger, smaller, numbers=both_sizes)
+    study.exported()
+    said = capsys.readouterr().err
+    for size in ("4.0 % (95 % interval 3.0 to 5.0)", "2.0 % (95 % interval 1.0 to 3.0)"):
+        assert f"{STEM}: corrected: plate_gain 1 fz: gain {size} taken off" in said
+
+
+def test_the_size_that_is_told_is_taken_off(hide):
+    """``extend`` leaves a person's own recordings out of what the laboratory tells; the sentence
+    does not."""
+    study = hide(GAIN[0])
+    own = (*GAIN[1][:2], [0.07])
+    study.diagnosed_as(own, numbers=(Number("gain", "1", 0.06, 0.05, 0.07),))
+    before, after = both(study, study.exported())
+    assert np.abs(wrenches(after) - wrenches(before))[..., :3].max() < 0.05
+
+
+def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("marker_shift", "T10")])
+    study.exported()
+    assert "marker_shift T10: one of several causes" in capsys.readouterr().err
+    assert _why_left("marker_shift", "unknown").startswith("no fault of the plates")
+    assert _why_left("marker_swap", "unknown") == _why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

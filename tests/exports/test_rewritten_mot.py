@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 
 COUNT, PLACE = 20, np.array([0.9, 0.0, 0.4])
+SAID = ["bsip 1: corrected; before: sha256 ab12", "delay 9 ms (95 % interval 8 to 10) taken off"]
 MORE = np.array([0.0, 20.0, 0.0, 1.0, 0.0, 2.0])
 
 
-def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
+def heavier(before):
+    return replace(before, readings=before.readings + MORE)
+
+
+def aside(before):
+    return replace(before, points_m=before.points_m + 0.01)
+
+
+def rewritten(tmp_path, change=heavier) -> tuple[Path, np.ndarray, np.ndarray]:
+    """The TRC file's copy, and the force and torque before."""
     times, rng = np.arange(COUNT) / 100, np.random.default_rng(3)
     force = rng.normal([5.0, 700.0, -3.0], 2.0, (COUNT, 3))
     torque = rng.normal(0.0, 30.0, (COUNT, 3))
@@ -27,13 +39,36 @@ def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
     body = [f"{k + 1}\t{t:.5f}\t0.1\t1.0\t0.2" for k, t in enumerate(times)]
     (tmp_path / "in.trc").write_text(head + "\n".join([*body, ""]))
 
-    def heavier(before):
-        return replace(before, readings=before.readings + MORE)
-
     copy = tmp_path / "new" / "in.trc"
     copy.parent.mkdir()
-    rewrite_trc_mot(tmp_path / "in.trc", copy, heavier)
-    found = np.loadtxt(copy.with_suffix(".mot"), skiprows=5)
+    rewrite_trc_mot(tmp_path / "in.trc", copy, change, SAID)
+    return copy, force, torque
+
+
+def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
+    copy, force, torque = rewritten(tmp_path)
+    found = np.loadtxt(copy.with_suffix(".mot"), skiprows=5 + len(SAID))
     assert np.allclose(found[:, 1:4], force + MORE[:3], atol=1e-5)
     assert np.allclose(found[:, 4:7], PLACE)
     assert np.allclose(found[:, 7:], torque + MORE[3:], atol=1e-5)
+
+
+def test_what_is_done_to_markers_alone_is_told_beside_the_forces(tmp_path):
+    copy = rewritten(tmp_path, aside)[0]
+    before, after = (
+        p.read_text().splitlines() for p in (tmp_path / "in.mot", copy.with_suffix(".mot"))
+    )
+    end = before.index("endheader")
+    assert after == [*before[:end], *SAID, *before[end:]]
+    assert copy.read_text() != (tmp_path / "in.trc").read_text()
+
+
+def test_opensim_reads_the_rewritten_files(tmp_path):
+    opensim = pytest.importorskip("opensim", reason="the opensim package is not installed")
+    copy, force, _ = rewritten(tmp_path)
+    table = opensim.TimeSeriesTable(str(copy.with_suffix(".mot")))
+    assert (table.getNumRows(), table.getNumColumns()) == (COUNT, 9)
+    vertical = table.getDependentColumn("ground_force_vy").to_numpy()
+    assert np.allclose(vertical, force[:, 1] + MORE[1], atol=1e-5)
+    assert opensim.Storage(str(copy.with_suffix(".mot"))).getSize() == COUNT
+    assert opensim.MarkerData(str(copy)).getNumFrames() == COUNT

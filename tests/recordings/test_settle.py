@@ -84,6 +84,11 @@ def of_points(
     return sources
 
 
+def of_c3d_with_level_reversed(**faults) -> list[C3dPlate]:
+    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
+    return [replace(one, measured=one.measured * signs) for one in of_c3d(**faults)]
+
+
 def of_table_with_x_for_y(**faults) -> list[ForceOnPoint]:
     return [replace(one, force_N=one.force_N[:, [1, 0, 2]]) for one in of_table(**faults)]
 
@@ -129,6 +134,7 @@ FAULTS = {
     "Fx and Fy exchanged": (of_c3d_with_fx_for_fy, {}, "exchanged Fx and Fy"),
     "Mx and My exchanged": (of_c3d_with_mx_for_my, {}, "exchanged Mx and My"),
     "Fx and Fy of a table exchanged": (of_table_with_x_for_y, {}, "exchanged Fx and Fy"),
+    "Fx and Fy reversed": (of_c3d_with_level_reversed, {}, "reversed Fx and Fy"),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
     "eight sensors, sound": (of_sensors, {}, ""),
     "a point and a torque, sound": (of_points, {}, ""),

@@ -10,7 +10,9 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
+from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
@@ -179,6 +181,9 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
+ENDS_AT = 2.0
+"""Times the size that is called large, where every scale ends."""
+
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
@@ -206,17 +211,18 @@ class Yardstick:
         return "good" if value <= self.good else "ordinary"
 
     def scale(self, value: float) -> Scale:
-        """The number on its way from nothing to a quarter beyond the limit, or beyond itself."""
-        end = max(1.25 * self.limit, 1.1 * value) if np.isfinite(value) else 1.25 * self.limit
+        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
+        end = ENDS_AT * self.limit
         return Scale(
             self.title,
             f"{number(value)} {self.unit}",
             self.words(value),
-            value / end if np.isfinite(value) else 0.0,
+            min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
             f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
             f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
+            bool(value > end),
         )
 
 
@@ -284,14 +290,6 @@ _LEAST = 0.5  # less is nothing
 LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
-@dataclass(frozen=True)
-class Piece:
-    """What some terms, taken together where they look alike, make of an error [%]."""
-
-    label: str
-    share: float
-
-
 def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tuple[Piece, ...]:
     """Of all trials together, the largest first; what is small together, then unknown and noise.
     Their sum is 100. ``found``: the effects that a diagnosis reports."""
@@ -328,7 +326,8 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     large, last = [], []
     for terms in _groups(rows):
         label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
-        piece = Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
+        share = float(rows.loc[list(terms), "share_percent"].sum())
+        piece = Piece(label, share, tuple(dict.fromkeys(map(_kind, terms))))
         least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
@@ -336,7 +335,7 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
             large.append(piece)
     large.sort(key=lambda one: -one.share)
     others = 100.0 - sum(one.share for one in (*large, *last))
-    rest = [Piece(REST, others)] if abs(others) >= _LEAST else []
+    rest = [Piece(REST, others, (cause_colours.REST,))] if abs(others) >= _LEAST else []
     return (*large, *rest, *last)
 
 
@@ -357,6 +356,10 @@ def term_words(term: str) -> str:
     if term.startswith(_FAULT):
         return EFFECT_WORDS[term.removeprefix(_FAULT)].title
     return _WORDS[term]
+
+
+def _kind(term: str) -> str:
+    return cause_colours.FAULT if term.startswith(_FAULT) else term
 
 
 def _label(term: str, found: Collection[str]) -> str:

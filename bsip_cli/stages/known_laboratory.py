@@ -3,8 +3,9 @@ the tables in which persons and laboratories tell it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -14,9 +15,10 @@ from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
 from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, Information, with_known
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.effect import Parameter, digits_of, readable_unit, with_unit
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record
+from bsip_cli.statistics.samples import Z95
 
 _KEY = ("effect", "target", "parameter", "standing")
 _FAULTS = {one.name for one in OF_A_LABORATORY}
@@ -25,12 +27,14 @@ _FAULTS = {one.name for one in OF_A_LABORATORY}
 @dataclass(frozen=True, eq=False)
 class Known:
     """coordinates (C,), mean (C,) and root (C, C) of the covariance of the sizes [typical] by all
-    other persons; rows : of the ``laboratory`` table, by all."""
+    other persons; rows : of the ``laboratory`` table, by all; own : size and standard deviation
+    [typical] of each by this person's recordings in motion alone."""
 
     coordinates: tuple[Coordinate, ...]
     mean: np.ndarray
     root: np.ndarray
     rows: pd.DataFrame
+    own: Mapping[Coordinate, tuple[float, float]]
 
     def beside(self, trial: FaultTrial, standing: bool) -> FaultTrial:
         return with_known(trial, standing, self.coordinates, self.mean, self.root)
@@ -46,6 +50,7 @@ class Known:
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
                 words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
                 known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
+                known += self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
                 yield Finding(
                     effect.name,
                     str(target),
@@ -56,6 +61,35 @@ class Known:
                     float(first["probability"]),
                     scope="laboratory",
                 )
+
+    def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> str:
+        """Whether this person's recordings show a fault too, by its largest number; empty where
+        they say nothing of it."""
+        sizes = dict(zip(rows["parameter"], rows["estimate"], strict=True))
+        first = rows.iloc[0]
+        known = [
+            (abs(sizes[p.name]) / p.typical, p, self.own[at])
+            for p in parameters
+            if (at := Coordinate(first["effect"], first["target"], p.name)) in self.own
+        ]
+        if not known:
+            return ""
+        _, parameter, (mean, sd) = max(known, key=itemgetter(0))
+        low, high = mean - Z95 * sd, mean + Z95 * sd
+        how = (
+            "also show it"
+            if low * high > 0 and mean * sizes[parameter.name] > 0
+            else "leave it open"
+        )
+        factor, unit = readable_unit(parameter.name, parameter.unit)
+        ends = [factor * parameter.typical * x for x in (mean, low, high)]
+        digits = digits_of(ends[2] - ends[1])
+        size, least, most = (f"{x:.{digits}f}" for x in ends)
+        shown = with_unit(size, unit)
+        return (
+            f", and this person's recordings alone {how}: {shown}, 95 % interval "
+            f"{with_unit(f'{least} to {most}', unit)}"
+        )
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
@@ -106,7 +140,28 @@ def known_laboratory(unit: Unit) -> Known | None:
         posterior.mean[at],
         vectors * np.sqrt(np.maximum(values, 0.0)),
         table,
+        _alone(told),
     )
+
+
+def _alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
+    """Size and standard deviation of what a person's sessions say in motion, each as large as
+    usual before the data; where the data say nothing there is none."""
+    parameters = {
+        x: p for one in sessions for x, p in zip(one.coordinates, one.parameters, strict=True)
+    }
+    known = sorted(x for x in parameters if not x.standing)
+    precision, pull = np.eye(len(known)), np.zeros(len(known))
+    for one in sessions:
+        mine = [k for k, x in enumerate(one.coordinates) if not x.standing]
+        at = [known.index(one.coordinates[k]) for k in mine]
+        precision[np.ix_(at, at)] += one.precision[np.ix_(mine, mine)]
+        pull[at] += one.pull[mine]
+    covariance = np.linalg.inv(precision)
+    model = np.array([parameters[x].known_to / parameters[x].typical for x in known])
+    sd = np.sqrt(np.diagonal(covariance) + model**2)
+    sizes = zip(known, covariance @ pull, sd, np.diagonal(precision) > 1.0, strict=True)
+    return {one: (float(mean), float(s)) for one, mean, s, is_there in sizes if is_there}
 
 
 # --- tables ---------------------------------------------------------------------------------------

@@ -37,6 +37,7 @@ from bsip_cli.report.cohort.record import (
 )
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
+    ENDS_AT,
     FORCE_LIMIT_PERCENT,
     Yardstick,
     one_number_alone,
@@ -49,6 +50,7 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import (
     MISSING,
+    abbreviations,
     capital,
     component_label,
     count,
@@ -58,6 +60,7 @@ from bsip_cli.report.words import (
     percent,
     signed,
     significant,
+    task_of,
     trial_label,
 )
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
@@ -79,7 +82,8 @@ _FEWEST = 5  # persons among whom one can lie far out
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
         title="Cohort: do motion and measured forces agree?",
-        subtitle="Ground forces measured by plates, against those computed from markers.",
+        subtitle="Ground forces measured by plates, against those computed from markers; the cohort: "
+        "all participants of this study.",
         front=tuple(_front(record)),
         sections=(
             Section("people", "Who took part?", (_people(record),)),
@@ -144,7 +148,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(Strip(title, values, names, far, one.good, one.limit))
+        drawn.append(Strip(title, values, names, far, one.good, one.limit, ENDS_AT * one.limit))
         rows[one.name] = list(values)
         far_out += [
             (
@@ -162,7 +166,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         "yardsticks",
         "A dot per person, with the parameters to use; the line is the median. COP: centre of "
         "pressure. Blue: as good as published (Hansen 2017, table 4; markers: quiet stance). Red: "
-        "large (Hicks 2015; OpenSim's checklist).",
+        "large (Hicks 2015; OpenSim's checklist). Triangles: beyond the axis, with the number.",
         "Strips of dots: errors per person.",
         "low and close together is good. All high: the laboratory. One high: that person.",
         "read the laboratory's part below, or the report of who lies far out.",
@@ -425,6 +429,8 @@ def diagnoses_section(record: CohortRecord) -> Section:
     if rows:
         head = ("participant", "found", "recordings", "probability")
         caption = "Probability: that the cause, or one of the group, is there"
+        if short := abbreviations(task_of(t) for one in people for t in one.trials):
+            caption += f". {short}"
         blocks.append(Grid(head, rows, caption, words=3))
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]

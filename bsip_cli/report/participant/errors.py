@@ -106,12 +106,12 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     for component in COMPONENTS:
         size, unit = size_of(record.budget, component)
         if size >= LEAST_TOLD_SIZE:
-            parts = tuple((p.label, p.share) for p in pieces(record.budget, component, found))
+            parts = pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
         yield Picture(
-            error_bars(bars, [piece.label for piece in overall_pieces(record.budget, found)]),
+            error_bars(bars, overall_pieces(record.budget, found)),
             "error_budget",
             "What makes the error of the table's parameters (RM) in each component, and how large it "
             "is, over all recordings.",

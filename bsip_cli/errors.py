@@ -51,8 +51,8 @@ class BsipError(Exception):
         return printable(f"{where}{self.found}{expected}{remedy}.")
 
     def __reduce__(self):  # crosses process borders with its data
-        told = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
-        return partial(type(self), **told), (self.found,)
+        known = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
+        return partial(type(self), **known), (self.found,)
 
 
 class UsageError(BsipError):

@@ -13,7 +13,7 @@ BMI_KG_M2 = (12.0, 60.0)
 children go down to 12.9 (WHO 2007, third percentile); beyond 60 begins the last class that surgery
 has a name for."""
 USUAL_BMI_KG_M2 = (12.0, 40.0)
-"""Those that tell which unit is meant where none is stated; obesity of class III begins at 40."""
+"""Those that show which unit is meant where none is stated; obesity of class III begins at 40."""
 
 
 @dataclass(frozen=True)

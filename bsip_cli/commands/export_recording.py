@@ -152,10 +152,10 @@ class _Correction:
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
         self._swaps = list(pairs.itertuples(index=False, name=None))
         self.causes: dict[Cause, str] = {}  # and what else it may be
-        self._told = told = unit.read("overall-diagnosis")
+        self._diagnosis = diagnosis = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
         for cause in causes_here(unit, [*self._plates]):
-            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
+            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, diagnosis)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
             if isinstance(cause.effect, MarkerSwap):
@@ -174,7 +174,7 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[cause] = others
-        here = _said_of(unit.name, told, [*EFFECTS])
+        here = _said_of(unit.name, diagnosis, [*EFFECTS])
         self.left += dict.fromkeys(
             f"{effect} {target}".strip()
             + (": one of several causes that look alike" if group else ": its size is not known")
@@ -183,10 +183,10 @@ class _Correction:
         )
         # what is there and has no name, or acts like a fault but not evenly
         self.left += dict.fromkeys(
-            f"{sentence}: nothing tells its course exactly"
-            for sentence in _said_of(unit.name, told, [UNEXPLAINED])["sentence"]
+            f"{sentence}: its signal is not known exactly"
+            for sentence in _said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
         )
-        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
+        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else diagnosis[:0]
         self.left += dict.fromkeys(
             f"{sentence}: no size of it is known for this recording"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
@@ -211,7 +211,11 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
-            *(_words(*one, scene, self._told) for one in self.causes.items() if scene is not None),
+            *(
+                _words(*one, scene, self._diagnosis)
+                for one in self.causes.items()
+                if scene is not None
+            ),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
                 for a, b, start, end in self._swaps
@@ -405,24 +409,26 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
     return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
-def _rows_of(cause: Cause, told: pd.DataFrame) -> pd.DataFrame:
+def _rows_of(cause: Cause, diagnosis: pd.DataFrame) -> pd.DataFrame:
     """What the diagnosis says of a cause, a row for each number."""
     key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
-    return told[(told[[*key]] == pd.Series(key)).all(axis=1)]
+    return diagnosis[(diagnosis[[*key]] == pd.Series(key)).all(axis=1)]
 
 
-def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
+def _alike(cause: Cause, diagnosis: pd.DataFrame) -> list[tuple[str, str]]:
     """Effects and targets that look like a cause in these recordings."""
-    groups = set(_rows_of(cause, told)["class_id"]) - {""}
-    is_it = (told["effect"] == cause.effect.name) & (told["target"] == cause.target)
-    others = told[told["class_id"].isin(groups) & ~is_it]
+    groups = set(_rows_of(cause, diagnosis)["class_id"]) - {""}
+    is_it = (diagnosis["effect"] == cause.effect.name) & (diagnosis["target"] == cause.target)
+    others = diagnosis[diagnosis["class_id"].isin(groups) & ~is_it]
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
 
 
-def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
+def _said_of(trial: str, diagnosis: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
     """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
-    here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
-    return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
+    here = np.array([trial in names.split(", ") for names in diagnosis["trials"]], dtype=bool)
+    return diagnosis[
+        here & diagnosis["effect"].isin(effects) & (diagnosis["verdict"] != "rejected")
+    ]
 
 
 def _stated(reading: PlateReading) -> PlateReading:
@@ -432,10 +438,10 @@ def _stated(reading: PlateReading) -> PlateReading:
     )
 
 
-def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:
+def _words(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -> str:
     """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
     readers of C3D know."""
-    values, rows = [], _rows_of(cause, told).set_index("parameter")
+    values, rows = [], _rows_of(cause, diagnosis).set_index("parameter")
     for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
         factor, readable = readable_unit(name, unit)
         low, high = factor * rows.reindex([name])[["ci_low", "ci_high"]].to_numpy()[0]

@@ -103,8 +103,8 @@ def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess |
     guess = told_from(recording.labels, prefix)
     chosen, best = guess.marker_set, guess.base
     if best is None:
-        told = f"of {ranked[0].labels} labels the words tell {len(chosen.markers)}"
-        said = f"none of the shipped sets fits; {told}"
+        read = f"of {ranked[0].labels} labels the words identify {len(chosen.markers)}"
+        said = f"none of the shipped sets fits; {read}"
     else:
         added = len(chosen.markers) - best.found
         more = "" if guess.is_shipped else f"; {added} more labels by their words"

@@ -157,8 +157,8 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
         equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
         folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
         settled = _settled(folds, laid, adapt)
-        told = zip(residual, laid.columns, laid.used, strict=True)
-        left, courses = zip(*(left_by(*one, *settled[:2]) for one in told), strict=True)
+        by_trial = zip(residual, laid.columns, laid.used, strict=True)
+        left, courses = zip(*(left_by(*one, *settled[:2]) for one in by_trial), strict=True)
     return ErrorModel(
         **vars(laid),
         trials=tuple(trials),
@@ -227,14 +227,14 @@ def _settled(
     for one in folds:
         gram[np.ix_(one.used, one.used)] += one.gram
         right[one.used] += one.right
-    told = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
-    told[np.unique(np.concatenate([one.used for one in folds]))] = True
-    gram, right = gram[np.ix_(told, told)], right[told]
-    place = np.cumsum(told) - 1
+    shown = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
+    shown[np.unique(np.concatenate([one.used for one in folds]))] = True
+    gram, right = gram[np.ix_(shown, shown)], right[shown]
+    place = np.cumsum(shown) - 1
     at: dict[str, np.ndarray] = {}
     for part in laid.parts:
         mine = np.arange(part.start, part.stop)
-        mine = place[mine[told[mine]]]
+        mine = place[mine[shown[mine]]]
         at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
     root = np.ones(len(right))
     for _ in range(_STEPS if adapt else 0):
@@ -245,10 +245,10 @@ def _settled(
             root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
     mean, covariance = posterior(gram, right, root)
     scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
-    if told.all():
+    if shown.all():
         return mean, covariance, scales
     whole = np.zeros(count)
-    whole[told] = mean
+    whole[shown] = mean
     return whole, covariance, scales
 
 

@@ -325,8 +325,8 @@ class _Fitting:
         scales = np.array([self.root[mine[0]] for mine in self.session.adapts])
         log -= 0.5 * WEIGHT * float((2 * np.log(scales) + 1 / scales**2 - 1).sum())
         each = np.array([one.log_likelihood(mean) for one in pieces])
-        told = self.root.copy(), mean, covariance, each, log
-        return Fitted(self.session, self.faults, self.starts, tuple(pieces), *told)
+        copied = self.root.copy(), mean, covariance, each, log
+        return Fitted(self.session, self.faults, self.starts, tuple(pieces), *copied)
 
 
 def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -415,13 +415,13 @@ def refined(fit: Fitted, one: Hypothesis) -> Hypothesis:
         return one.with_values(session, values)
 
     def of(x: np.ndarray) -> tuple[np.ndarray, _Marginal]:
-        told = _marginal(fit, at(x))
-        ridge = told.information + np.eye(len(told.pull)) / SIZES[1] ** 2
-        return np.linalg.solve(ridge, told.pull), told
+        scores = _marginal(fit, at(x))
+        ridge = scores.information + np.eye(len(scores.pull)) / SIZES[1] ** 2
+        return np.linalg.solve(ridge, scores.pull), scores
 
     def left(x: np.ndarray) -> float:
-        size, told = of(x)
-        return -float(told.pull @ size)
+        size, scores = of(x)
+        return -float(scores.pull @ size)
 
     start = np.zeros(int(scanned.sum()))
     simplex = {"initial_simplex": np.vstack([start, np.eye(len(start))])}

@@ -119,7 +119,7 @@ def held_out(fit: Fitted) -> HeldOut:
 
 
 def _linear(fit: Fitted) -> np.ndarray:
-    """(K,) False for moments, frequencies and windows: without the second that tells them nothing
+    """(K,) False for moments, frequencies and windows: without the second that shows them nothing
     does, so they stay as all seconds have them."""
     kept = np.ones(len(fit.mean), dtype=bool)
     for number, one in enumerate(fit.faults):
@@ -145,8 +145,8 @@ def _means(
             right = (piece.right + more.get(t, 0.0))[rows]
             its[np.ix_(piece.used, piece.used)] -= white.T @ white
             to[piece.used] -= white.T @ right
-        told = np.ix_(kept, kept)
-        means[fold, kept] = posterior(its[told], to[kept], fit.root[kept])[0]
+        block = np.ix_(kept, kept)
+        means[fold, kept] = posterior(its[block], to[kept], fit.root[kept])[0]
     return means
 
 
@@ -185,8 +185,8 @@ class Uneven(Nameless):
         return self.effect.reported(scene, target, values)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        told = self.effect.sentence(scene, target, values)
-        return f"of unknown cause: {told}, but not evenly"
+        known = self.effect.sentence(scene, target, values)
+        return f"of unknown cause: {known}, but not evenly"
 
 
 def plain(effect: Effect) -> Effect:

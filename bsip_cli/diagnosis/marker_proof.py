@@ -79,8 +79,8 @@ class Proof:
             self.effect.reported(scene, self.target, x) for x in (self.values, *self.draws)
         )
         numbers = numbers_of(reported, drawn)
-        told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
-        sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
+        found = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
+        sentence = f"{found}; this is {100 * self.share:.0f} % of {whose} squared residual"
         more: dict[str, Any] = {"scope": scope_of(self.effect)}
         if gain is not None and gain.is_real():
             more["gain"] = gain.interval()
@@ -173,8 +173,8 @@ def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding
 def bend_of(
     scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
-    """A second bend of the trunk or soft tissue that moves with it, which markers do not tell
-    apart, where that is much of their residuals given slips; nothing where it is little."""
+    """A second bend of the trunk or soft tissue that moves with it, which markers do not
+    distinguish, where that is much of their residuals given slips; nothing where it is little."""
     fewer = every(scene, ENOUGH_HZ)
     left = fewer.residual_m
     if left is None:
@@ -191,13 +191,13 @@ def bend_of(
     if waist.share >= bend.share:
         return ()  # by so much scaling errs
     alike = f"a second bend and soft tissue look alike here: to distinguish them, {effect.remedy}"
-    told = bend.finding(fewer, trial, None)
-    told = replace(
-        told,
+    found = bend.finding(fewer, trial, None)
+    found = replace(
+        found,
         verdict="ambiguous",
         class_id=class_id,
-        sentence=f"{told.sentence}; {alike}",
-        probability=told.probability / 2,  # nothing speaks for the one rather than the other
+        sentence=f"{found.sentence}; {alike}",
+        probability=found.probability / 2,  # nothing speaks for the one rather than the other
     )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
@@ -206,7 +206,7 @@ def bend_of(
         f"are {1000 * size:.0f} mm off; {alike}"
     )
     numbers = (Number("size", "m", size),)
-    return told, replace(told, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
+    return found, replace(found, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
@@ -239,9 +239,9 @@ def _sized(
     shapes = [
         _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
     ]
-    told = np.stack(shapes, axis=-1) * effect.is_told(scene, target)
+    shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
     lasts = bool(scanned) and _is_throughout(scene, scanned[0])
-    columns, course, block = _in_rows(scene, told, residual_m, with_means=lasts)
+    columns, course, block = _in_rows(scene, shown, residual_m, with_means=lasts)
     mine = [block == number for number in np.unique(block)]
     grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
     rights = np.stack([columns[rows].T @ course[rows] for rows in mine])
@@ -253,7 +253,7 @@ def _sized(
     left = course - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
-    misplaced = _misplaced(told, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
+    misplaced = _misplaced(shown, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
     drawn = [
         candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
         for one in _bootstrap(grams, rights, prior, misplaced, rng)
@@ -279,14 +279,14 @@ def _is_throughout(scene: Scene, from_s: float) -> bool:
     return from_s < scene.times_s[0]
 
 
-def _misplaced(told: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(DRAWS, k) what markers that sit elsewhere than the model has them, as far as these usually
     do, add to the right-hand side of shapes (N, m, 3, k)."""
     seen = np.isfinite(residual_m).all(axis=2).any(axis=0)
     places = np.nanmean(residual_m[:, seen], axis=0)
     usual = np.median(np.linalg.norm(places, axis=1)) / MEDIAN_LENGTH
-    known = np.isfinite(residual_m)[..., None] & np.isfinite(told)
-    total = np.where(known, told, 0.0).sum(axis=0).reshape(-1, told.shape[-1])
+    known = np.isfinite(residual_m)[..., None] & np.isfinite(shown)
+    total = np.where(known, shown, 0.0).sum(axis=0).reshape(-1, shown.shape[-1])
     return usual * rng.standard_normal((DRAWS, len(total))) @ total
 
 
@@ -314,12 +314,12 @@ def _bootstrap(
     rng: np.random.Generator,
 ) -> list[np.ndarray]:
     """DRAWS of the sizes (k,), stretches drawn with replacement, ``misplaced`` (DRAWS, k) added to
-    the right-hand side; what the markers hardly tell is drawn nearer to zero, by the prior, than
+    the right-hand side; what the markers hardly show is drawn nearer to zero, by the prior, than
     it may be, and scatters by as much."""
-    count, told = len(grams), grams.sum(axis=0) + prior
+    count, total = len(grams), grams.sum(axis=0) + prior
     drawn = rng.integers(count, size=(DRAWS, count))
-    untold = prior @ np.linalg.solve(told, rng.standard_normal((len(prior), DRAWS)))
+    undetermined = prior @ np.linalg.solve(total, rng.standard_normal((len(prior), DRAWS)))
     return [
         np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + apart
-        for one, more, apart in zip(drawn, misplaced, untold.T, strict=True)
+        for one, more, apart in zip(drawn, misplaced, undetermined.T, strict=True)
     ]

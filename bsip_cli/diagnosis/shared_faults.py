@@ -4,7 +4,7 @@ The plates, the clock and the vertical belong to a laboratory, body and skin to 
 person's equations only those of the shared faults are kept: of the white normal equations
 [G_oo G_os; G_so G_ss] x = [a_o; a_s] what is left when the own coefficients, of covariance R, are
 integrated out, G_ss - G_so (G_oo + R^-1)^-1 G_os and the like. These sum over persons. What trials
-tell in which a person stands still to be calibrated is kept apart from what motion tells: a plate
+show in which a person stands still to be calibrated is separate from what motion shows: a plate
 that moved between them is no contradiction.
 """
 
@@ -42,7 +42,7 @@ _ASKED = (*OF_A_LABORATORY, STATED_MASS)
 class Coordinate:
     """One number of a fault at a plate, or a channel of it; the clock has no target.
 
-    standing : as trials tell it in which a person stands still; else all others, or both alike.
+    standing : as quiet stance shows it; else all others, or both alike.
     """
 
     effect: str
@@ -54,7 +54,7 @@ class Coordinate:
 @dataclass(frozen=True, eq=False)
 class Information:
     """Of C coordinates [typical sizes]: precision (C, C) and pull (C,), so that the likeliest
-    sizes of this person alone solve precision @ sizes = pull. trials (C,) : how many tell of it."""
+    sizes of this person alone solve precision @ sizes = pull. trials (C,) : how many show it."""
 
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]

@@ -163,12 +163,12 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
 
 # --- do the plates carry the person whose mass is stated? -----------------------------------------
 
-# The wrench alone cannot tell: free parameters follow the plates. Nothing in a quiet trial tells
-# why the plates read another mass, and nothing in moving ones where the inertial parameters follow
-# the plates or several plates carry the person. So this is a class of causes, of which every one is
+# The wrench alone does not show it: free parameters follow the plates. Nothing in a quiet trial
+# shows why the plates read another mass, and nothing in moving ones where the inertial
+# parameters follow the plates or several plates carry the person. So this is a class of causes, of which every one is
 # printed with its own size.
 
-NOTICED = 0.02  # part of the mass from which on it is told, if a scale errs less
+NOTICED = 0.02  # part of the mass from which on it is reported, if a scale errs less
 SURE_OF_SCALE = 2.5  # standard deviations of a stated mass beyond which it is
 LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 CLASS = "W"  # of the weight; those found in the motion are A, B, C
@@ -230,7 +230,7 @@ def stated_mass_findings(
         return ()
     p_value = float(2 * norm.sf(abs(share) / mass_sd))  # how likely a scale errs by that much
     error, extra = mass_sd * mass_kg, share * mass_kg
-    told = (
+    found = (
         f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
         f"{'more' if extra > 0 else 'less'} than stated"
     )
@@ -251,7 +251,7 @@ def stated_mass_findings(
             target,
             trials,
             (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
-            f"{told}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
+            f"{found}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
             p_value,
             (1 - p_value) / (len(causes) + 1),
             "ambiguous",

@@ -144,7 +144,7 @@ IMPACT, IMPACT_S = 0.8, 0.05
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
 # Soft tissue is no point on one spring: its numbers are known to these standard deviations. Beneath
-# the markers of a limb the skin slides, and the mass that swings there is told too low.
+# the markers of a limb the skin slides, and the mass that swings there is found too low.
 MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 
@@ -239,7 +239,7 @@ SLOWEST_HZ, FASTEST_HZ = 0.12, 0.6
 # The breastbone moves ahead and up; torso axes.
 OUTWARD = np.array([0.8, 0.6, 0.0])
 LEAST_BREATHS = 3
-# A quarter of it is not told: as much is where the markers of the chest breathe and no mass does.
+# A quarter of it is no finding: so much is where the markers of the chest breathe and no mass does.
 TYPICAL_KG_M = 0.3
 PACE_HZ = 3e-4  # to which a pace is known: nobody breathes like a clock
 

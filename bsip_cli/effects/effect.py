@@ -59,7 +59,7 @@ class Effect(ABC):
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
     looks: ClassVar[str]  # what a person sees of it in the curves
     remedy: ClassVar[str]  # what would separate it from its rivals
-    least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not told
+    least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not reported
 
     @property
     def lasts(self) -> bool:
@@ -106,7 +106,7 @@ class Effect(ABC):
         """(K,) True for the parameters without a scan."""
         return np.array([not p.scan for p in self.parameters(scene, target)])
 
-    def is_told(self, scene: Scene, target: str) -> np.ndarray:
+    def is_identifiable(self, scene: Scene, target: str) -> np.ndarray:
         """(k,) True for the parameters without a scan of which the motion can decide anything."""
         return np.ones(int(self.is_free(scene, target).sum()), dtype=bool)
 

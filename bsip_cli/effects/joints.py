@@ -171,19 +171,19 @@ class MissingJoint(Effect):
         ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
 
-    def is_told(self, scene: Scene, target: str) -> np.ndarray:
+    def is_identifiable(self, scene: Scene, target: str) -> np.ndarray:
         """A movement that is hardly made says nothing of its part."""
         made = np.ptp(_turn(scene, scene.person.skeleton.index(target)), axis=0) > LITTLE_RAD
         return made[list(AXES.values())]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        asked = np.where(self.is_told(scene, target), values, 0.0)
+        asked = np.where(self.is_identifiable(scene, target), values, 0.0)
         return super().possible(scene, target, asked)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         shares = dict(zip(AXES, values.tolist(), strict=True))
-        told = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
-        parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in told.items())
+        large = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
+        parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in large.items())
         return f"the trunk moves at a second joint between waist and neck ({parts})"
 
     @staticmethod

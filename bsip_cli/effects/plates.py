@@ -168,7 +168,7 @@ class PlateGain(OfPlates):
     """
 
     name = "plate_gain"
-    # A quarter of 0.04 is not told: plates of one lab differ by some tenths of a percent.
+    # A quarter of 0.04 is not reported: plates of one lab differ by some tenths of a percent.
     numbers = (Parameter("gain", "1", -0.15, 0.15, 0.04),)
     channels = CHANNELS[:3]
     looks = (

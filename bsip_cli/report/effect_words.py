@@ -96,12 +96,12 @@ def unnamed_label(number_name: str, where: str) -> str:
     )
 
 
-_TOLD = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
+_COMPLETE = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
 
 
 def parameter_label(effect: str, parameter: str) -> str:
     """What an interval is of, where the sentence leaves that open; else empty."""
-    return "" if effect in _TOLD else str(_WORDS["parts"].get(parameter, ""))
+    return "" if effect in _COMPLETE else str(_WORDS["parts"].get(parameter, ""))
 
 
 def size_words(parameter: str, unit: str, size: float) -> str:

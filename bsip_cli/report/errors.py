@@ -287,7 +287,7 @@ _WORDS = {
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
-LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
+LEAST_REPORTED_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
 def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tuple[Piece, ...]:
@@ -314,9 +314,9 @@ def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
 
 
 def _overall(budget: pd.DataFrame) -> pd.DataFrame:
-    told = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_TOLD_SIZE]
+    large = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_REPORTED_SIZE]
     mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
-    by_term = mine[mine["component"].isin(told)].groupby("term", sort=False)
+    by_term = mine[mine["component"].isin(large)].groupby("term", sort=False)
     alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
     return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
 
@@ -389,7 +389,7 @@ def budget_sentences(budget: pd.DataFrame, found: Collection[str]) -> tuple[str,
 def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> str:
     size, unit = size_of(budget, component)
     total = _total(budget, component)
-    if total is None or not size >= LEAST_TOLD_SIZE:
+    if total is None or not size >= LEAST_REPORTED_SIZE:
         return ""
     shares = pieces(budget, component, found)
     parts = [f"{one.label} {number(one.share, 0)} %" for one in shares]

@@ -55,7 +55,7 @@ from bsip_cli.statistics.methods import OM, RM
 ALL_FAULTS = "wrong"
 """Address of the section that has all of them."""
 
-_UNTOLD = 1e-3  # probabilities this near to 0 or 1 are not told in digits
+_NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
 _MOST_MEMBERS = 2  # of a group, in a line
@@ -210,7 +210,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{one.beside_usual()}{sure}."
+    return f"{capital(one.in_words(remarks=one.is_of_all))}, {where}{one.beside_usual()}{sure}."
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -244,13 +244,13 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     first = cause[0]
     places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], _how_sure(cause)
     if len(cause) == 1:
-        return f"{capital(first.told())}{places[0]}. {sure}".rstrip()
+        return f"{capital(first.in_words())}{places[0]}. {sure}".rstrip()
     common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
     members = []
     for k, (one, place) in enumerate(zip(cause, own, strict=True)):
         words = probability_words(one.probability)
         probability = f", probability {words}" if words else ""
-        members.append(f"({_letter(k)}) {one.told()}{place}{probability}")
+        members.append(f"({_letter(k)}) {one.in_words()}{place}{probability}")
     apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person on a scale; {apart}"
@@ -309,9 +309,9 @@ def probability_words(probability: float) -> str:
     """``99.5 %`` or ``over 99.9 %``; empty where there is none."""
     if np.isnan(probability):
         return ""
-    if probability > 1 - _UNTOLD:
+    if probability > 1 - _NEARLY_SURE:
         return "over 99.9 %"
-    return f"{number(100 * probability, 1)} %" if probability >= _UNTOLD else "under 0.1 %"
+    return f"{number(100 * probability, 1)} %" if probability >= _NEARLY_SURE else "under 0.1 %"
 
 
 # --- what it does -----------------------------------------------------------------------------

@@ -136,7 +136,7 @@ def _changed_files(unit: Unit, kind: str) -> list[str]:
 
 def _changed(unit: Unit, kind: str) -> list[str]:
     path = unit.path(kind)
-    if not path.is_file():  # a folder in its place is told when it is to be written
+    if not path.is_file():  # a folder in its place is reported when it is to be written
         return []
     try:
         read_header(path, kind)

@@ -75,7 +75,7 @@ class Unit:
         return self.trial
 
     def warn(self, message: str) -> None:
-        """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
+        """For the user when the unit is done or refused, and the reader of its artifacts later."""
         self.messages.append(printable(message))
 
     def say(self, sentence: str) -> None:
@@ -181,7 +181,7 @@ class Unit:
         if participant is not None and self.trial is None:
             owners = [participant.id, *(trial.stem for trial in participant.trials)]
             before = takewhile(lambda stage: stage.label != self.stage.label, STAGES)
-            folder = self.out / participant.id  # reports tell of them
+            folder = self.out / participant.id  # reports speak of them
             paths += [folder / name for name in _refusals(names, owners, tuple(before))]
         return {path.name: path for path in paths}
 
@@ -247,7 +247,7 @@ class Unit:
             files = self.inputs()
             hashes = {name: file_hash(path) for name, path in files.items() if path.exists()}
             of_all = [k for k in self.stage.inputs if SCHEMAS[k].level == "cohort" and self._has(k)]
-            for kind in of_all:  # what a result of the group tells its participants
+            for kind in of_all:  # what a result of the group says to its participants
                 answer = json.dumps(self.facts(kind)["answer"], sort_keys=True)
                 hashes[f"{kind} of the group"] = hashlib.sha256(answer.encode()).hexdigest()
             return hashes

@@ -63,7 +63,7 @@ def run(unit: Unit) -> None:
     movements = dict.fromkeys(judge.trial.task for judge in judges)
     by_movement = {one: [judge for judge in judges if judge.trial.task == one] for one in movements}
     of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
-    # every movement counts once; of a single one, as far as its own trials tell
+    # every movement counts once; of a single one, as far as its own trials show
     over_all = next(iter(of_each.values()), _UNKNOWN)
     if len(of_each) > 1:
         logs = {pair: [one[pair].log for one in of_each.values()] for pair in PAIRS}

@@ -51,9 +51,9 @@ def run(unit: Unit) -> None:
         found, library, held = _searched(unit, free, known)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
-        told = {(one.effect, one.target) for one in more if one.verdict == "named"}
-        if any((one.effect, one.target) in told for one in findings):
-            findings = ()  # the movements tell which cause of the class of the stated mass it is
+        named = {(one.effect, one.target) for one in more if one.verdict == "named"}
+        if any((one.effect, one.target) in named for one in findings):
+            findings = ()  # the movements show which cause of the stated mass's group it is
         findings = (*findings, *more)
         findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
         facts |= facts_of(found, held, findings)
@@ -95,10 +95,10 @@ def _searched(
 ) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, given what the markers prove and other persons show."""
     options = unit.config.diagnosis
-    told = [
+    given = [
         x.for_faults if known is None else known.beside(x.for_faults, not x.moves) for x in trials
     ]
-    session = session_of(told)
+    session = session_of(given)
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
     slips = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]
@@ -128,9 +128,9 @@ def _of_markers(
 
 def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
     """Large errors, less the trials already reported with an error of unknown cause."""
-    told = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
+    named = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
     for one in large:
-        if trials := tuple(t for t in one.trials if t not in told):
+        if trials := tuple(t for t in one.trials if t not in named):
             yield replace(one, trials=trials)
 
 

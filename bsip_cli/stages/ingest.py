@@ -40,7 +40,7 @@ def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
     recording = assemble(opened(unit, unit.own_trial), session)
-    marker_set, told = _marker_set(unit, recording)
+    marker_set, about_set = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, prefix_of(unit)
     )
@@ -55,7 +55,7 @@ def run(unit: Unit) -> None:
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *told, *paired, *match.findings, *repeats]
+    findings = [*recording.findings, *about_set, *paired, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed
@@ -184,17 +184,17 @@ def _mass_on_plates(
     """
     options = unit.config.ingest
     height_m = unit.person.height_m if stated is None else None
-    told = told_mass({unit.name: stretches}, options.mass_half_width_percent, height_m)
-    if stated is not None and not told.is_known:
-        told = told_mass({unit.name: stretches}, VAGUE_PERCENT)
-    comparison = compared(unit, stated, told, unit.load_kg())
-    about = [mass_finding(told, comparison, stated.source if stated else "")]
+    measured = told_mass({unit.name: stretches}, options.mass_half_width_percent, height_m)
+    if stated is not None and not measured.is_known:
+        measured = told_mass({unit.name: stretches}, VAGUE_PERCENT)
+    comparison = compared(unit, stated, measured, unit.load_kg())
+    about = [mass_finding(measured, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)
-    told_kg = told.mass_kg if told.is_known else None
+    measured_kg = measured.mass_kg if measured.is_known else None
     if from_plates:
-        return told_kg, told_kg, about
+        return measured_kg, measured_kg, about
     assert stated is not None
-    return stated.mass_kg + unit.load_kg(), told_kg, about
+    return stated.mass_kg + unit.load_kg(), measured_kg, about
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:

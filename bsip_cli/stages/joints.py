@@ -61,7 +61,7 @@ def run(unit: Unit) -> None:
     spread = _spreads(unit, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
-    left_out = _tell(unit, trial, reasons)
+    left_out = _report(unit, trial, reasons)
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
@@ -202,7 +202,7 @@ def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
             yield cause.target, np.abs(trial.times_s - middle) <= length / 2
 
 
-def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
+def _report(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
     """Say what is left out, in one sentence: joints of one reason and number of frames together.
 
     Returns, by joint, what left frames out, in words; empty where nothing did.

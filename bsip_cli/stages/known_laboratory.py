@@ -1,5 +1,5 @@
 """What a person's diagnosis knows of plates, clock and vertical from the others recorded there, and
-the tables in which persons and laboratories tell it."""
+the tables that hold what persons and laboratories show."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Known:
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
-        and the clock as the others alone tell them."""
+        and the clock as the others alone show them."""
         sizes = dict(zip(self.coordinates, self.mean.tolist(), strict=True))
         for found in self.findings(trials):
             parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
@@ -129,8 +129,8 @@ def known_laboratory(unit: Unit) -> Known | None:
         return None  # of several laboratories, or alone
     (number,) = persons
     pooled = unit.read("laboratory-sums", laboratory=[number])
-    told = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
-    posterior = pooled_in(pooled).without(told).posterior()
+    sessions = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
+    posterior = pooled_in(pooled).without(sessions).posterior()
     at = [k for k, one in enumerate(pooled_in(pooled).coordinates) if one.effect in _FAULTS]
     table = unit.read("laboratory", laboratory=[number], scope=["laboratory"])
     covariance = posterior.covariance[np.ix_(at, at)]
@@ -140,7 +140,7 @@ def known_laboratory(unit: Unit) -> Known | None:
         posterior.mean[at],
         vectors * np.sqrt(np.maximum(values, 0.0)),
         table,
-        _alone(told),
+        _alone(sessions),
     )
 
 

@@ -18,7 +18,7 @@ from bsip_cli.study.study import Trial
 
 _NAMED = ("named", "ambiguous")
 _LOADED_N = 20.0
-_HALF_M = 0.3  # of a plate whose outline no file tells
+_HALF_M = 0.3  # of a plate whose outline no file states
 
 
 def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None) -> Scene:

@@ -96,8 +96,8 @@ def columns_of(header: Sequence[str]) -> Columns:
     others = [t for k, t in enumerate(header) if k not in {c.index for c in found}]
     near = _misspelt(others, [name for name in KNOWN if name not in known])
     faults += [f"has a column {title!r} and no {name}" for title, name in near]
-    told = {*known, *(c.name for c in found), *(name for _, name in near)}
-    if lost := [name for name in REQUIRED if name not in told]:
+    named = {*known, *(c.name for c in found), *(name for _, name in near)}
+    if lost := [name for name in REQUIRED if name not in named]:
         faults.append(f"has no column {', '.join(lost)}")
     return Columns(known, tuple(faults))
 

@@ -17,7 +17,7 @@ Role = Literal["static", "sequence", "validation"]
 
 RECORDINGS = (".c3d", ".trc")
 MANY = 20
-"""So many names are no more told one by one in a message."""
+"""So many names are no more listed one by one in a message."""
 
 _TRIAL = re.compile(
     r"(?P<participant>sub-[A-Za-z0-9]+)(_ses-(?P<session>[A-Za-z0-9]+))?"

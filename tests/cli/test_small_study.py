@@ -729,7 +729,7 @@ def test_warnings_are_told_and_kept(run, bsip):
     answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
     assert answer.code == 0
     (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
-    assert "the plates tell" in told
+    assert "the plates measure" in told
     kept = read_header(run.path("person"))["provenance"]["messages"]
     assert told.removeprefix("scale: ") in kept
 

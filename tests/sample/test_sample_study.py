@@ -112,7 +112,7 @@ def test_valid_windows_follow_the_true_contacts(out):
 
 
 def test_the_balls_that_nobody_tells_of_are_found(out):
-    """In at least 11 of 12 throws, of which two seconds or less can be used, and nothing else is named.
+    """In at least 11 of 12 throws, of which two seconds or less can be used; nothing else is named.
 
     When a ball leaves the hand in the air no plate feels it, so such times are left out of the
     count; intervals of some others are too narrow (6 or 7 hundredths of a second off, or in a gap).

@@ -462,8 +462,8 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
     for one in people:
         if one.was_searched and not one.causes:
             movements = labelled(listing(list(one.trials)))
-            told = f" (searched: {movements})" if one.trials else ""
-            of_movements.setdefault(told, []).append(one.id)
+            where = f" (searched: {movements})" if one.trials else ""
+            of_movements.setdefault(where, []).append(one.id)
     return [
         f"No fault was found in {named_people(names)}{movements}."
         for movements, names in of_movements.items()
@@ -471,10 +471,10 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
 
 
 def _cause_row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
-    told = [capital(one.told()) for one in cause]
+    texts = [capital(one.in_words()) for one in cause]
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
-        told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
+        texts[0] if len(texts) == 1 else f"One of these: {'; '.join(texts)}",
         labelled(listing(list(dict.fromkeys(t for one in cause for t in one.trials)))),
         probability_words(probability_of(cause)) or MISSING,
     )

@@ -133,7 +133,7 @@ SHARED = (
     "(a few of very many may be coincidence):"
 )
 _MOST_NAMED = 12  # participants in one sentence
-_MOST_TOLD = 8  # causes
+_MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
 Cause = tuple[Candidate, ...]
@@ -170,7 +170,7 @@ def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     alike; what most people have comes first. The laboratory's faults are in its own part."""
     shared = [found for found in _found(people) if len(found.people) > 1]
     shared.sort(key=lambda found: -len(found.people))
-    said = [_told(found, people) for found in shared[:_MOST_TOLD]]
+    said = [_in_words(found, people) for found in shared[:_MOST_SAID]]
     left = len(shared) - len(said)
     return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
 
@@ -196,7 +196,7 @@ def _found(people: Sequence[Searched]) -> list[_Found]:
     return list(found.values())
 
 
-def _told(found: _Found, people: Sequence[Searched]) -> str:
+def _in_words(found: _Found, people: Sequence[Searched]) -> str:
     unsure = [person for person in found.people if person not in found.named_of]
     possibly = "possibly " if not found.named_of else ""
     asked = _asked(found, people)

@@ -12,7 +12,7 @@ from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Sectio
 from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.errors import (
-    LEAST_TOLD_SIZE,
+    LEAST_REPORTED_SIZE,
     Gain,
     gains_of,
     one_number_alone,
@@ -105,7 +105,7 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     bars = []
     for component in COMPONENTS:
         size, unit = size_of(record.budget, component)
-        if size >= LEAST_TOLD_SIZE:
+        if size >= LEAST_REPORTED_SIZE:
             parts = pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))

@@ -27,7 +27,7 @@ class Stage:
     entries: only they enter the provenance. ``module`` holds the ``function`` of a unit that does
     it. ``amends`` are kinds of its own level that earlier stages write and to which it adds rows.
     ``part`` distinguishes two steps of one name and level. ``reads_recordings``: these are
-    input. ``costs_s``: of a unit beside others.
+    input. ``costs_s``: of a unit among others.
     """
 
     name: str

@@ -308,7 +308,8 @@ def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) 
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Changes (10 k,) of k segments with covariance, beside what is declared and to be expected."""
+    """Changes (10 k,) of k segments with covariance, against what is declared and to be
+    expected."""
 
     analysis: str
     phi: np.ndarray

@@ -197,7 +197,7 @@ class Request:
 
     ``model_file`` is an OpenSim model to be given the inertias, ``model_bodies`` names its map;
     ``repair`` replaces tensors that no body can have by the nearest possible ones. ``what`` is
-    written into ``to``, or beside the results.
+    written into ``to``, or next to the results.
     """
 
     method: str | None = None

@@ -184,7 +184,7 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
         raise BadDataError(
             "no recording can be used" if unused else "no files",
             file=", ".join(map(str, given)),
-            expected="C3D files, or TRC files with their MOT or STO beside them",
+            expected="C3D files, or TRC files with their MOT or STO next to them",
             remedy="correct what is said of each" if unused else "name the folder they lie in",
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
@@ -244,7 +244,7 @@ def _planned(
 
 
 def _write(plan: _Plan) -> None:
-    """Everything into a folder beside, which gets the study's name when it is whole."""
+    """Everything into a folder next to it, which gets the study's name when it is whole."""
     out = plan.out.absolute()
     made = out.with_name(f".{out.name}.{os.getpid()}.bsip-part")
     try:

@@ -152,7 +152,7 @@ def _of_markers(
     scene: Scene, sd_m: float, skin_factor: float
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Per segment with markers: what markers elsewhere on it do, and what skin that follows the
-    angles of the joints beside it does, each marker as far as its residuals show."""
+    angles of the joints next to it does, each marker as far as its residuals show."""
     rms = _marker_rms_m(scene)
     for segment in np.unique(scene.person.marker_segments).tolist():
         (mine,) = np.nonzero(scene.person.marker_segments == segment)

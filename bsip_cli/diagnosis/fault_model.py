@@ -117,7 +117,7 @@ def _prior_root(session: Session, one: Hypothesis) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A trial's equations, white beside the noise of size (6,) and recursion (6, p).
+    """A trial's equations, white under the noise of size (6,) and recursion (6, p).
 
     white (6 n, K'), right (6 n,) : columns about the coefficients ``used`` (K',), and residual.
     gram (K', K'), against (K',) : their products.
@@ -293,7 +293,7 @@ class _Fitting:
         return found
 
     def _piece(self, trial: int, course: np.ndarray) -> Piece:
-        """Beside what may be left of a trial (n, 6)."""
+        """Whitened by what may be left of a trial (n, 6)."""
         return self._white(trial, *white_noise_of(self.session.trials[trial].errors, course))
 
     def _white(self, trial: int, size: np.ndarray, recursion: np.ndarray) -> Piece:
@@ -338,7 +338,7 @@ def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]
     return gram, against
 
 
-# --- the likeliest sizes of one more fault beside a fit -------------------------------------------
+# --- the likeliest sizes of one more fault given a fit --------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,7 @@ class Persons:
         return self.count // 2 + self.groups[self.numbers[self.standing]]
 
     def blocks(self, who: Iterable[int] | None = None) -> Iterator[tuple[np.ndarray, ...]]:
-        """precision, pull and usual of all or some, a few at a time: beside what is kept of each
+        """precision, pull and usual of all or some, a few at a time: but for what is kept of each
         person, no memory grows with their number."""
         mine = np.arange(len(self.pull)) if who is None else np.array([*who])
         for k in range(0, len(mine), _BLOCK):
@@ -268,7 +268,7 @@ def anything(persons: Persons, scale: np.ndarray) -> np.ndarray:
 def scales_of(
     persons: Persons, *parts: Iterable[int], start: np.ndarray | None = None
 ) -> np.ndarray:
-    """(G,) of the deviations and of who stands still, of the largest evidence beside any faults of
+    """(G,) of the deviations and of who stands still, of the largest evidence given any faults of
     the laboratory; of other sizes in each part of its persons. start (G,) : near to it."""
     everybody = [list(one) for one in parts] or [list(range(len(persons.pull)))]
     scale = np.ones(persons.count) if start is None else start

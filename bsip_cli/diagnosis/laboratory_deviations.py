@@ -106,7 +106,7 @@ def _likeliest(
     lab: Laboratory, causes: Sequence[Cause], asked: Iterable[tuple[int, Sums]]
 ) -> list[int]:
     """The sets of sessions that deviate most, with the scales of all: only of these the scales
-    beside their deviation are fitted, which among many sessions are the same."""
+    jointly with their deviation are fitted, which among many sessions are the same."""
     posterior = lab.posterior()
     odds = {}
     for k, own in asked:

@@ -165,8 +165,8 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
 
 # The wrench alone does not show it: free parameters follow the plates. Nothing in a quiet trial
 # shows why the plates read another mass, and nothing in moving ones where the inertial
-# parameters follow the plates or several plates carry the person. So this is a class of causes, of which every one is
-# printed with its own size.
+# parameters follow the plates or several plates carry the person. So this is a class of causes,
+# of which every one is printed with its own size.
 
 NOTICED = 0.02  # part of the mass from which on it is reported, if a scale errs less
 SURE_OF_SCALE = 2.5  # standard deviations of a stated mass beyond which it is

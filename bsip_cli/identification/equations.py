@@ -15,7 +15,7 @@ from bsip_cli.dynamics.pinocchio_model import bodies_of
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.statistics.samples import effective_samples
 
-# --- what the instruments may do wrong, beside the body -------------------------------------------
+# --- what the instruments may do wrong, jointly with the body -------------------------------------
 
 # A plate some millimetres aside looks like a lopsided trunk, and forces some milliseconds late like
 # heavier limbs. Both are unknowns of the same equations: their spread is an option of [identify],
@@ -140,18 +140,18 @@ def accumulate(
     cutoff_hz: float,
     reference_m: np.ndarray,
     weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
-    beside: Instruments | None = None,
+    instruments: Instruments | None = None,
 ) -> NormalEquations:
     """Both sides of the equations through the same low-pass, decimated, weighted and summed.
 
     ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
     of the trials.
     """
-    size = 10 * len(bodies_of(model)) + (INSTRUMENT_COUNT if beside else 0)
+    size = 10 * len(bodies_of(model)) + (INSTRUMENT_COUNT if instruments else 0)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, beside)
+        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, instruments)
         for regressor, wrench, noise_level in blocks:
             root = np.sqrt(weights_at(noise_level))
             measured = root * wrench
@@ -187,7 +187,7 @@ def _filtered_blocks(
     recording: Recording,
     cutoff_hz: float,
     reference_m: np.ndarray,
-    beside: Instruments | None = None,
+    instruments: Instruments | None = None,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
     (n, 6) about the reference, and the accelerations' noise level (n,)."""
@@ -204,8 +204,8 @@ def _filtered_blocks(
         regressor = wrench_regressor(
             model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
         )
-        if beside:
-            columns = beside.columns(regressor, recording.rate_hz)
+        if instruments:
+            columns = instruments.columns(regressor, recording.rate_hz)
             regressor = np.concatenate([regressor, columns], axis=2)
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
         mine = slice(start, start + _ROWS)

@@ -51,7 +51,7 @@ class _Problem:
     squares, neighbours, ends : sums of z z', of z[t] z[t - 1]' and its transpose, and of the
         first and the last sample's z z'.
     places : (p,) where a step may be.
-    after, beside : (p, 1 + k + d) sums of the samples from a place on, and of those from the
+    after, around : (p, 1 + k + d) sums of the samples from a place on, and of those from the
         places before and after it on.
     penalised : (1 + k, 1 + k) ones on the diagonal for the columns, zero for the constant.
     coefficient_sd : prior spread of the columns' coefficients.
@@ -68,7 +68,7 @@ class _Problem:
         self.squares, self.neighbours = z.T @ z, follow + follow.T
         self.ends = np.outer(z[0], z[0]) + np.outer(z[-1], z[-1])
         self.places, self.after = places, from_on[places]
-        self.beside = from_on[places - 1] + from_on[places + 1]
+        self.around = from_on[places - 1] + from_on[places + 1]
         self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
         self.coefficient_sd = coefficient_sd
 
@@ -78,7 +78,7 @@ class _Problem:
 
     def with_steps(self, r: float) -> np.ndarray:
         """(p, 1 + k + d) products of z with a step at each place, both whitened."""
-        return (1.0 + r * r) * self.after - r * self.beside + r * (1.0 - r) * self.z[-1]
+        return (1.0 + r * r) * self.after - r * self.around + r * (1.0 - r) * self.z[-1]
 
     def prior(self, error: float) -> np.ndarray:
         """(1 + k, 1 + k) what the prior adds to the equations."""

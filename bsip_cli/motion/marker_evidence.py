@@ -63,7 +63,7 @@ _FAR = 3.0  # misfit of the trial over the trusted distance
 _BETTER = 0.5  # misfit exchanged over that as labelled
 _ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
 _LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
-_LATERAL_M = 0.05  # a marker of the trunk this far beside its middle belongs to a side
+_LATERAL_M = 0.05  # a marker of the trunk this far from its middle belongs to a side
 _MIRRORED_M = 0.1  # the places of a pair are mirrored to this
 _FRAMES = 24
 

@@ -9,7 +9,7 @@ the spline.
 Skin adds noise that is not white: its acceleration has the same power at all frequencies, so it
 grows like 1 / f^4 towards low ones, and it keeps pace with the motion. The best gain against both
 is 1 / (1 + (sigma^2 / tau^2) w^8 + rho w^4) with the skin's share rho: a penalty on the second
-differences beside the one on the fourth.
+differences next to the one on the fourth.
 """
 
 from __future__ import annotations

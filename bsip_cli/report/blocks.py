@@ -225,7 +225,7 @@ class Document:
 
 
 FILES = "figures"
-"""Folder beside the page that holds its figures and the numbers behind them."""
+"""Folder next to the page that holds its figures and the numbers behind them."""
 
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"

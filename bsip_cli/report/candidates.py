@@ -126,7 +126,7 @@ class Candidate:
         sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
         return max(sizes or self.numbers, key=Number.certainty, default=None)
 
-    def beside_usual(self) -> str:
+    def against_usual(self) -> str:
         """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
         size, usual = self.main_number(), USUAL.get(self.effect)
         if size is None or usual is None or self.effect in OBJECTS:

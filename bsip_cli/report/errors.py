@@ -173,7 +173,7 @@ def _change(ratio: float, log_error: float) -> str:
     return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
 
 
-# --- three numbers of a recording beside what good laboratories and the literature have -----------
+# --- three numbers of a recording against those of good laboratories and the literature -----------
 
 
 COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"

@@ -155,9 +155,9 @@ def light_of(
     nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
-        besides = "besides it " if found and any(map(is_large, causes)) else ""
+        more = "also " if found and any(map(is_large, causes)) else ""
         error = f"Large error{mostly(budget, effects_in(causes), use)}"
-        title = "; ".join(filter(None, (error, f"{besides}{found}")))
+        title = "; ".join(filter(None, (error, f"{more}{found}")))
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
     if not causes:
@@ -210,7 +210,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.in_words(remarks=one.is_of_all))}, {where}{one.beside_usual()}{sure}."
+    return f"{capital(one.in_words(remarks=one.is_of_all))}, {where}{one.against_usual()}{sure}."
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:

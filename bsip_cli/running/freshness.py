@@ -27,7 +27,7 @@ def why_stale(unit: Unit) -> str:
     for kind in unit.stage.writes:
         if why := _why_not(unit, kind, "made_by"):
             return why
-        if names := _changed_files(unit, kind):  # beside the artifact: pages, figures, tables
+        if names := _changed_files(unit, kind):  # next to the artifact: pages, figures, tables
             return f"{names[0]} has changed since bsip wrote it"
     amended = (_why_not(unit, kind, "amended_by") for kind in unit.stage.amends)
     return next(filter(None, amended), "")

@@ -127,9 +127,9 @@ class Plan:
 
     angles_rad : waist, neck (T, 3): flexion about Z, about X, about Y;
         spine (T, 3), if given: the same, of the thorax on the abdomen;
-        girdle_* (T, 2), if given: clavicle raised and brought forward beside what the arm's rhythm
-        does; shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,): flexion;
-        wrist_* (T, 3): flexion, radial deviation, pronation.
+        girdle_* (T, 2), if given: clavicle raised and brought forward on top of what the arm's
+        rhythm does; shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,):
+        flexion; wrist_* (T, 3): flexion, radial deviation, pronation.
     pelvis_angles_rad : (T, 3) about Z, X, Y in the walkway frame; (nominal in flight).
     pelvis_m : (T, 3) nominal path of the lumbar joint centre.
     feet : by side, "l" and "r".

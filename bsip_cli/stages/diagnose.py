@@ -73,7 +73,7 @@ def run(unit: Unit) -> None:
             limits = known.limits(limits)
     findings = (*(one.held.finding(one.trial.stem) for one in trials if one.held), *findings)
     budget, large = error_budget(unit, trials, facts["causes"])
-    findings = (*_beside(findings, large), *findings)
+    findings = (*_not_reported_yet(findings, large), *findings)
     if not trials:
         unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")
     names = dict.fromkeys(
@@ -96,7 +96,7 @@ def _searched(
     """Faults that the forces show, given what the markers prove and other persons show."""
     options = unit.config.diagnosis
     given = [
-        x.for_faults if known is None else known.beside(x.for_faults, not x.moves) for x in trials
+        x.for_faults if known is None else known.given_to(x.for_faults, not x.moves) for x in trials
     ]
     session = session_of(given)
     alone = [t for t, one in enumerate(trials) if one.moves]
@@ -126,7 +126,7 @@ def _of_markers(
             yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
 
 
-def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
+def _not_reported_yet(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
     """Large errors, less the trials already reported with an error of unknown cause."""
     named = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
     for one in large:

@@ -142,6 +142,6 @@ def problem_of(
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
         last = None if left else instruments  # the weights need the body alone
         joint = accumulate(model, recordings, cutoff, reference, noise.weights_at, last)
-    beside, whole = joint.with_known(prior.phi, known), joint.of_the_body(len(prior.phi))
-    equations = beside.of_the_body(len(prior.phi))
-    return Problem(equations, noise, prior, basis, *judgement, whole, beside), reference
+    jointly, whole = joint.with_known(prior.phi, known), joint.of_the_body(len(prior.phi))
+    equations = jointly.of_the_body(len(prior.phi))
+    return Problem(equations, noise, prior, basis, *judgement, whole, jointly), reference

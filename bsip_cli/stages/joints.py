@@ -42,7 +42,13 @@ from bsip_cli.stages.frames import (
     person_of,
 )
 from bsip_cli.stages.reconstruct import parameters_of
-from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
+from bsip_cli.stages.trial_scene import (
+    body_as_sized,
+    causes_of,
+    outline,
+    plate_names,
+    scene_of,
+)
 from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
@@ -175,9 +181,9 @@ def _reasons(unit: Unit, trial: _Trial, feet: FootForces) -> Reasons:
     found = {_NO_POSE: np.tile(~trial.determined[:, None], joints)}
     unseen = person.without_data()[1:]
     found["no markers show how the segment moves"] = np.tile(unseen, (count, 1))
-    beside = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
+    off_plate = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
     if trial.readings:
-        found[_HELD] = np.tile((~trial.measured & ~beside)[:, None], joints)
+        found[_HELD] = np.tile((~trial.measured & ~off_plate)[:, None], joints)
     for side in SIDES:
         legs = [i - 1 for i in person.skeleton.way(f"foot_{side}")]
         for words, frames in feet.unknown[side].items():
@@ -282,7 +288,7 @@ def _extended(
     """Method, loads and valid frames (N, J) of the extended models of this trial.
 
     Forces freed of the errors of plates and clock, axes of their tilts; parameters as ``extend``
-    found them; what a segment carries besides, as a ball in a hand, loads the joints on its way to
+    found them; what else a segment carries, as a ball in a hand, loads the joints on its way to
     the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
     joints or single markers would need another motion: no model with one of them is computed.
     """
@@ -292,7 +298,7 @@ def _extended(
         return
     person = trial.person
     names, phi = parameters_of(pd.concat([bsip, extended]), person)
-    scene = scene_of(unit, person, body_beside(unit, phi[:, names.index(RM)]))
+    scene = scene_of(unit, person, body_as_sized(unit, phi[:, names.index(RM)]))
     known = load_phi(unit, person)
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
@@ -314,7 +320,7 @@ def _extended(
         freed = [replace(one, wrench=corrected.get(name, one.wrench)) for one, name in pairs]
         feet, on_feet = trial.ground(freed)
         q, upright = in_true_axes(trial.q, on_feet, among)
-        touched = besides(replace(scene, q=q), upright, among)
+        touched = other_loads(replace(scene, q=q), upright, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
         loads = replace(trial, q=q).loads(body[:, None], touched, of_om)
         reasons = _reasons(unit, trial, feet)
@@ -354,7 +360,7 @@ def in_true_axes(
     return q, on_feet
 
 
-def besides(
+def other_loads(
     scene: Scene, on_feet: Mapping[str, Ground], causes: Sequence[Cause]
 ) -> dict[str, Ground]:
     """What acts on each segment: the ground, less what the causes at a segment need."""

@@ -36,7 +36,7 @@ class Known:
     rows: pd.DataFrame
     own: Mapping[Coordinate, tuple[float, float]]
 
-    def beside(self, trial: FaultTrial, standing: bool) -> FaultTrial:
+    def given_to(self, trial: FaultTrial, standing: bool) -> FaultTrial:
         return with_known(trial, standing, self.coordinates, self.mean, self.root)
 
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:

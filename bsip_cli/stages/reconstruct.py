@@ -1,4 +1,4 @@
-"""reconstruct: ground wrench and COP from motion and inertia, beside the measured ones.
+"""reconstruct: ground wrench and COP from motion and inertia, next to the measured ones.
 
 What extend shares: a trial's wrenches filtered, judged and tabulated alike.
 """

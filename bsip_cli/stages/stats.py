@@ -1,5 +1,5 @@
 """Cohort: every participant's numbers in one tidy table, the tests between the methods, and of both
-the papers' six tables with the published values beside them, as CSV, Markdown and LaTeX."""
+the papers' six tables with the published values next to them, as CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
     return tuple(Cause(*key, *both) for key, both in zip(keys, sizes, strict=True))
 
 
-def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:
+def body_as_sized(unit: Unit, phi: np.ndarray) -> np.ndarray:
     """(10 n,) the body for which the causes were sized: RM's (10 n,), made as heavy as the
     plates read where the diagnosis believes them instead of the stated mass."""
     return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])

@@ -182,7 +182,7 @@ class Criteria:
     equivalence_percent: float
 
 
-# --- OM against a rival over the participants: the published t test, and what stands beside it ----
+# --- OM against another method over the participants: the published t test, and what it lacks -----
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +219,7 @@ def description(topic: Topic, method: str, values: Sequence[Value]) -> Compariso
 
 
 def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
-    """Paired t test with Cohen's d as printed; beside it d_z, and Wilcoxon's test."""
+    """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
     normality = lilliefors_test(np.subtract(*finite_pairs(pair.x, pair.y)))
     by_t = pair.row(
@@ -254,7 +254,7 @@ def smaller_error(pair: Pair) -> Comparison:
 # --- measured, OM and RM side by side: the published ANOVA of three groups, and the one for them --
 
 
-def methods_beside_each_other(
+def methods_compared(
     topic: Topic, table: NDArray[np.float64], methods: Sequence[str], alpha: float
 ) -> Iterator[Comparison]:
     """Both ANOVAs with their Bonferroni post hoc tests, over the participants with all methods.
@@ -325,7 +325,7 @@ def _tests_of_topic(
     if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
         methods = (MEASURED, OM, RM)
         columns = per_participant(values, methods)
-        yield from methods_beside_each_other(topic, columns, methods, alpha)
+        yield from methods_compared(topic, columns, methods, alpha)
     for pair in pairs_of(topic, values, "published" if is_published else "added"):
         if only_described:  # means and SDs
             means = described_pair(*finite_pairs(pair.x, pair.y))

@@ -177,7 +177,7 @@ def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
 def _why_no_t(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
     if len(x) < MINIMUM_PAIRS:
         return f"A paired t test needs {MINIMUM_PAIRS} pairs, there are {len(x)}."
-    if is_constant(x - y, beside=_magnitude(x, y)):
+    if is_constant(x - y, magnitude=_magnitude(x, y)):
         return "All differences are equal, so the t statistic has no finite value."
     return ""
 

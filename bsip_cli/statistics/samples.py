@@ -144,14 +144,14 @@ def finite_pairs(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     return first[both], second[both]
 
 
-def is_constant(values: NDArray[np.float64], *, beside: float = 0.0) -> bool:
+def is_constant(values: NDArray[np.float64], *, magnitude: float = 0.0) -> bool:
     """Whether the values vary by no more than rounding.
 
     values : shape (n,), n > 0.
-    beside : largest magnitude of what the values were computed from, in their unit; the
+    magnitude : largest magnitude of what the values were computed from, in their unit; the
         difference of two large numbers carries their rounding.
     """
-    scale = max(float(np.max(np.abs(values))), beside)
+    scale = max(float(np.max(np.abs(values))), magnitude)
     return float(np.ptp(values)) <= ROUNDING * scale
 
 

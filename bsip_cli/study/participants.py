@@ -135,7 +135,7 @@ def _misspelt(titles: Sequence[str], lacking: Sequence[str]) -> list[tuple[str, 
 
 
 def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
-    """With legend and units of the JSON that BIDS puts beside the table; and what is to be said.
+    """With legend and units of the JSON that BIDS puts next to the table; and what is to be said.
 
     A legend in the table's own header goes before it.
     """
@@ -348,7 +348,7 @@ def _sex_fault(text: str, name: str) -> _Clauses:
             'header, as in "sex (0=F, 1=M)", or as Levels in participants.json'
         )
     elif text.strip().casefold() == "m":
-        remedy = "write mujer or man: beside H an M may be either"
+        remedy = "write mujer or man: next to H an M may be either"
     return f"sex {text!r} of {name}", "M, F, other or n/a", remedy
 
 

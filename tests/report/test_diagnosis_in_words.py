@@ -192,8 +192,7 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     )
     both = pd.concat([large, found[found["rank"] > 1]])
     assert (
-        light_of(both, detection(TRIALS)).title
-        == "Large error, cause unknown; besides it 1 fault found"
+        light_of(both, detection(TRIALS)).title == "Large error, cause unknown; also 1 fault found"
     )
 
 

@@ -100,7 +100,7 @@ def setup_xml(
     name: str, files: Mapping[str, str], from_s: float, to_s: float, said: Sequence[str]
 ) -> str:
     """Set-up of InverseDynamicsTool; files : ``model_file``, ``coordinates_file`` and
-    ``external_loads_file``, beside it. The motion is smooth: no further filter."""
+    ``external_loads_file``, next to it. The motion is smooth: no further filter."""
     document = _document(said)
     tool = ET.SubElement(document, "InverseDynamicsTool", name=name)
     texts = {"results_directory": ".", **files, "time_range": f"{from_s:.12g} {to_s:.12g}"}

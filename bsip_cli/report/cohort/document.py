@@ -71,7 +71,7 @@ SHOWN = {
 }
 """Columns of a participant's artifacts that are shown."""
 
-_KEPT = ("n", "p")  # columns of the tables, beside means
+_KEPT = ("n", "p")  # columns of the tables, next to means
 _MOST = 6  # sentences of a kind on the first page
 _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
@@ -267,8 +267,8 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
                 yield from _table(table)
             if own := files.pop(table.name, []):
                 yield Links("As a file:", tuple(own))
-        beside = tuple((name, of[0][1]) for name, of in files.items())
-        yield from [Links("Beside the published values:", beside)] if beside else []
+        published = tuple((name, of[0][1]) for name, of in files.items())
+        yield from [Links("Next to the published values:", published)] if published else []
 
 
 def _table(table: Table) -> Iterator[Block]:

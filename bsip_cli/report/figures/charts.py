@@ -159,7 +159,7 @@ def segment_masses(data: pd.DataFrame) -> Figure:
     return figure
 
 
-# --- a dot per person: errors beside their yardsticks, and what identification gains --------------
+# --- a dot per person: errors and their yardsticks, and what identification gains -----------------
 
 
 _SPREAD = 0.28

@@ -215,7 +215,7 @@ def build_tables(
     fitted_on: Sequence[Mapping] = (),
     missing: Sequence[Mapping] = (),
 ) -> tuple[Table, ...]:
-    """The six tables as data, and the first four beside the published values.
+    """The six tables as data, and the first four next to the published values.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def build_tables(
             model.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
-    return (*tables, *(published.beside(tag, of_table[tag]) for tag in IN_PRINT))
+    return (*tables, *(published.next_to_published(tag, of_table[tag]) for tag in IN_PRINT))
 
 
 def folder(out: Path) -> Path:

@@ -140,7 +140,7 @@ class ErrorModel(Laid):
     def without(self) -> tuple[np.ndarray, ...]:
         """Per fold the coefficients (K,), and their scales, of all other folds."""
         others = ([one for one in self.folds if one is not out] for out in self.folds)
-        return tuple(_settled(rest, self, self.adapt)[0] for rest in others)
+        return tuple(_solution(rest, self, self.adapt)[0] for rest in others)
 
 
 def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
@@ -156,15 +156,15 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
     for _ in range(_ROUNDS):
         equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
         folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
-        settled = _settled(folds, laid, adapt)
+        solution = _solution(folds, laid, adapt)
         by_trial = zip(residual, laid.columns, laid.used, strict=True)
-        left, courses = zip(*(left_by(*one, *settled[:2]) for one in by_trial), strict=True)
+        left, courses = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
     return ErrorModel(
         **vars(laid),
         trials=tuple(trials),
-        mean=settled[0],
-        covariance=settled[1],
-        scales=settled[2],
+        mean=solution[0],
+        covariance=solution[1],
+        scales=solution[2],
         left=left,
         folds=folds,
         adapt=adapt,
@@ -218,7 +218,7 @@ def left_by(
     return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
 
 
-def _settled(
+def _solution(
     folds: Sequence[Fold], laid: Laid, adapt: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
     """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""

@@ -30,7 +30,7 @@ SIZES = (0.1, 10.0)  # of a fault, in what laboratories meet: two decades about 
 _STEPS, _FEW_STEPS = 8, 2  # of expectation and maximisation
 _ROUNDS = 12  # of what is left, at most
 _STEADY = 0.01  # change of every scale
-_SETTLED = 0.3  # change of the logarithm of the evidence
+_CONVERGED = 0.3  # change of the logarithm of the evidence
 _DIFFERENCE = 0.05  # of the typical size: a moment in time moves by a part of a frame at least
 _CORRECTIONS = 3  # of the values about which the columns are
 _EXACT = 0.02  # of the typical size
@@ -288,7 +288,7 @@ class _Fitting:
                     course = left_by(*self.laid[t], found.mean, found.covariance)[1]
                     pieces[t] = self._piece(t, course)
             found = self._solved(pieces, whole)
-            if abs(found.log_evidence - before.log_evidence) < _SETTLED:
+            if abs(found.log_evidence - before.log_evidence) < _CONVERGED:
                 break
         return found
 

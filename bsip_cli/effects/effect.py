@@ -58,7 +58,7 @@ class Effect(ABC):
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
     looks: ClassVar[str]  # what a person sees of it in the curves
-    remedy: ClassVar[str]  # what would separate it from its rivals
+    remedy: ClassVar[str]  # what would separate it from others of its ambiguity group
     least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not reported
 
     @property

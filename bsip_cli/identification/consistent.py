@@ -202,7 +202,7 @@ _NEVER_WIDER = slice(0, 2)  # of the spreads: masses, centres
 # of that: it shapes what [prior] spreads, and little data must not make it a narrower prior.
 _GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0)
 _ROUNDS = 20
-_SETTLED = 0.02  # relative change of the weights
+_CONVERGED = 0.02  # relative change of the weights
 _LARGEST_CHANGE = 4.0  # per round
 
 
@@ -309,7 +309,7 @@ def fit_with_weights(terms: Terms) -> Fit:
         for _ in range(_ROUNDS):
             old, new = fit.weights.spread, _updated(terms, fit)
             fit = fit_at(terms, Weights(new, gamma), fit)
-            if np.abs(np.log(new / old)).max() < _SETTLED:
+            if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
         if best is None or fit.evidence > best.evidence:
             best, spread = fit, fit.weights.spread

@@ -238,10 +238,10 @@ def _penalty(
         pace = (sum(_FOURTH[k] * c[k : k + n] for k in range(5)) ** 2).mean(axis=1)
         new = _mean(known, window) / np.maximum(_mean(pace, window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
-        settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
+        converged = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
         penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
-        if settled:
+        if converged:
             break
     return penalty
 

@@ -224,9 +224,9 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     said += consequences(causes[:_MOST], only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
     for k, cause in groups[:1]:
-        rivals = [(one.effect, one.target) for one in cause]
+        members = [(one.effect, one.target) for one in cause]
         on_scale = cause[0].class_id == OF_THE_WEIGHT
-        step = "weigh the person on a scale" if on_scale else separating_recording(rivals, most=1)
+        step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:

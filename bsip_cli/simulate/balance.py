@@ -301,8 +301,8 @@ def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np
         landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * dt)])
         height[first - before : first] += _from_rest(takeoff, before, dt)
         # the same bridge, run backwards in time
-        settled = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
-        height[last + 1 : last + 1 + after] += settled[::-1]
+        landed = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
+        height[last + 1 : last + 1 + after] += landed[::-1]
     return height
 
 

@@ -22,7 +22,7 @@ def run(unit: Unit) -> None:
         unit.write("diagnosis", empty_table("diagnosis"))
         return
     concerned = np.array([stem in trials.split(", ") for trials in overall["trials"]], dtype=bool)
-    classes = set(overall["class_id"][concerned]) - {""}  # rivals of other trials belong to them
+    classes = set(overall["class_id"][concerned]) - {""}  # those of other trials belong to them
     concerned |= overall["class_id"].isin(classes).to_numpy()
     rows = overall[concerned & (overall["effect"] != "none").to_numpy()]
     if (rows["verdict"] == "rejected").all():

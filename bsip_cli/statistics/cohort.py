@@ -27,7 +27,7 @@ from bsip_cli.statistics.hypothesis_tests import (
     wilcoxon,
     williams_t,
 )
-from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
+from bsip_cli.statistics.methods import ALTERNATIVES, MEASURED, OM, RM
 from bsip_cli.statistics.samples import (
     TestResult,
     adjusted_p_values,
@@ -187,28 +187,28 @@ class Criteria:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """(participants,) values x of OM and y of a rival, in the topic's unit.
+    """(participants,) values x of OM and y of another method, in the topic's unit.
 
-    ``origin`` : of the tests that the papers make of OM and RM; with another rival they are added.
+    ``origin`` : of the tests that the papers make of OM and RM; with other methods they are added.
     """
 
     topic: Topic
-    rival: str
+    other: str
     x: Sample
     y: Sample
     origin: Origin
 
     def row(self, test: str, origin: Origin, result: TestResult, **more: Any) -> Comparison:
-        return Comparison(self.topic, test, origin, OM, self.rival, **(vars(result) | more))
+        return Comparison(self.topic, test, origin, OM, self.other, **(vars(result) | more))
 
 
 def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[Pair]:
-    """OM with RM, and with each other rival of which there are values."""
+    """OM with RM, and with each other method of which there are values."""
     known = {value.method for value in values}
-    for rival in RIVALS:
-        if rival == RM or rival in known:
-            x, y = per_participant(values, (OM, rival)).T
-            yield Pair(topic, rival, x, y, origin if rival == RM else "added")
+    for other in ALTERNATIVES:
+        if other == RM or other in known:
+            x, y = per_participant(values, (OM, other)).T
+            yield Pair(topic, other, x, y, origin if other == RM else "added")
 
 
 def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
@@ -227,7 +227,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
         pair.origin,
         test,
         effect_size=cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b),
-        effect_size_name=f"Cohen's d (pooled SD, {pair.rival} - OM)",
+        effect_size_name=f"Cohen's d (pooled SD, {pair.other} - OM)",
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
@@ -240,8 +240,8 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
 
 def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
     """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    rival = mean_of(finite_pairs(pair.x, pair.y)[1])
-    bound = abs(rival) * criteria.equivalence_percent / 100.0
+    other = mean_of(finite_pairs(pair.x, pair.y)[1])
+    bound = abs(other) * criteria.equivalence_percent / 100.0
     return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
 
 
@@ -330,7 +330,7 @@ def _tests_of_topic(
         if only_described:  # means and SDs
             means = described_pair(*finite_pairs(pair.x, pair.y))
             yield pair.row("description", pair.origin, means)
-        elif table != "table3" or pair.rival != RM:
+        elif table != "table3" or pair.other != RM:
             yield from t_and_rank_tests(pair, alpha)
             if table == "table1":
                 yield equivalence(pair, criteria)

@@ -319,7 +319,7 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
     sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
     faults = [] if sex else [_sex_fault(cells["sex"], row.id)]
     mass, height = (_Found(cells.get(q.column, ""), q, table.columns) for q in (MASS, HEIGHT))
-    _settle(mass, height)
+    _decide(mass, height)
     faults += [one.fault(row.id) for one in (mass, height) if one.is_lost]
     if faults:
         found, expected, remedies = zip(*faults, strict=True)
@@ -393,7 +393,7 @@ class _Found:
         return f"{self.title} {self.text!r} of {name}", expected, remedy
 
 
-def _settle(mass: _Found, height: _Found) -> None:
+def _decide(mass: _Found, height: _Found) -> None:
     """Of several units keep those with which mass and height are of one person."""
     if not mass.readings or not height.readings:
         return

@@ -11,7 +11,7 @@ from bsip_cli.dynamics.joint_moments import Ground, joint_loads
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.loads import Implement
 from bsip_cli.effects.scene import Scene
-from bsip_cli.stages.joints import other_loads, in_true_axes, sharing
+from bsip_cli.stages.joints import in_true_axes, other_loads, sharing
 from tests.dynamics.test_joint_moments import KNOWN, feet, motion, phi_of
 from tests.effects.moving_scene import unwritable
 

@@ -46,8 +46,8 @@ def truth(name: str) -> dict:
 def test_om_beats_rm_on_unseen_movements_in_every_component(out):
     errors = held_out_errors(out).groupby("component").mean()
     for component in COMPONENTS:
-        rivals = errors.loc[component, ["RM", "RM+mass"]]
-        assert errors.loc[component, "OM"] < rivals.min(), component
+        others = errors.loc[component, ["RM", "RM+mass"]]
+        assert errors.loc[component, "OM"] < others.min(), component
 
 
 def test_om_halves_the_error_of_the_cop_in_the_identification_sequence(out):

@@ -312,7 +312,7 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         )
     worse = []
     for name in names:
-        over = ratios.over_rival(name)
+        over = ratios.over_best_other(name)
         fewer, more, _ = _counts(over)
         worse += [component_label(name)] if _typical(over) > 0.0 or more > fewer else []
     yield Paragraph(
@@ -368,7 +368,7 @@ def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
 
 
 def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
-    better, worse, everyone = _counts(ratios.over_rival(component))
+    better, worse, everyone = _counts(ratios.over_best_other(component))
     return (
         component_label(component),
         *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),

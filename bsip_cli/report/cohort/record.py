@@ -16,7 +16,7 @@ from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, capital, listing, number, task_of
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM
+from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
@@ -42,10 +42,10 @@ class Ratios:
         errors = self.of_component[component]
         return (errors[method] / errors[RM]).to_numpy()
 
-    def over_rival(self, component: str) -> np.ndarray:
+    def over_best_other(self, component: str) -> np.ndarray:
         """(p,) of OM over those of the better of RM and RM+mass."""
         errors = self.of_component[component]
-        return (errors[OM] / errors[list(RIVALS)].min(axis="columns")).to_numpy()
+        return (errors[OM] / errors[list(ALTERNATIVES)].min(axis="columns")).to_numpy()
 
 
 def ratios_of(read: ReadValues) -> Ratios:

@@ -137,7 +137,7 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
         tests = results.values(topic, of_error) | results.values(r, of_r)
         tests["label"] = f"{name} [{unit_label(topic.unit)}]"
         tests["reason"] = joined(results.reasons(topic), results.reasons(r))
-        for method in SHORT:  # tests stand in OM's row; those of its rivals leave them empty
+        for method in SHORT:  # tests stand in OM's row; those of other methods leave them empty
             own = tests if method == OM else dict.fromkeys(tests, "")
             of_method = _means_of_six(results, topic, method)
             values = {**of_topic, "method": method, **own, **of_method}
@@ -160,7 +160,7 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
 
 
 def _errors_of_six() -> Iterator[Column]:
-    """Tests of the RMSE, of OM against each rival."""
+    """Tests of the RMSE, of OM against each other method."""
     for one in paired.smaller_error("n_paired", "sign.n"):
         yield one
         name, pair = one.fields[0], one.of[0][2:]

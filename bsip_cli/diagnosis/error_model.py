@@ -143,10 +143,10 @@ class ErrorModel(Laid):
         return tuple(_solution(rest, self, self.adapt)[0] for rest in others)
 
 
-def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
+def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -> ErrorModel:
     """Fit coefficients, scales and what is left.
 
-    stretches : into so many each trial is cut, of which each is held out in turn.
+    parts : into so many each trial is cut, of which each is held out in turn.
     adapt : scales from the data; else everything is as large as usual.
     """
     laid = laid_out(trials)
@@ -155,7 +155,7 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
     courses = residual
     for _ in range(_ROUNDS):
         equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
-        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
+        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, parts))
         solution = _solution(folds, laid, adapt)
         by_trial = zip(residual, laid.columns, laid.used, strict=True)
         left, courses = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
@@ -178,13 +178,13 @@ def _folds(
     columns: np.ndarray,
     used: np.ndarray,
     course: np.ndarray,
-    stretches: int,
+    parts: int,
 ) -> Iterator[Fold]:
     """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
     size, recursion = white_noise_of(one, course)
     rows = one.filter.innovations(columns / size[:, None], recursion)
     right = one.filter.innovations((residual / size)[..., None], recursion)[:, 0]
-    for part in np.array_split(np.arange(len(course)), min(stretches, len(course))):
+    for part in np.array_split(np.arange(len(course)), min(parts, len(course))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
 

@@ -68,7 +68,7 @@ def recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray
 
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
-    """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
+    """Low-pass and decimation inside the valid intervals, moments about where the person stands."""
     stride = stride_to(scene.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1

@@ -18,7 +18,7 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
 
 FOLDS = 5
-BLOCK_S = 1.0  # stretches of time that stand for independent ones
+BLOCK_S = 1.0  # intervals of time that stand for independent ones
 
 
 @dataclass(frozen=True, eq=False)

@@ -229,7 +229,7 @@ def _sized(
     """The effect's free parameters from the markers' residuals (N, m, 3), scanned ones given.
 
     What lasts throughout shows in the means of the residuals alone, which are as sure as the
-    markers' places in the model. Stretches of BLOCK_S are taken for independent: so much noise is
+    markers' places in the model. Intervals of BLOCK_S are taken for independent: so much noise is
     laid on each frame that all frames together say no more, and the sizes have their typical
     spread before the data.
     """
@@ -293,7 +293,7 @@ def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generat
 def _in_rows(
     scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray, with_means: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shapes (r, k), residual (r,) and number of the stretch (r,) where both are known, without
+    """Shapes (r, k), residual (r,) and number of the interval (r,) where both are known, without
     the mean of each marker and direction or with it."""
     known = np.isfinite(residual_m).all(axis=2) & np.isfinite(shapes_m).all(axis=(2, 3))
     block = ((scene.times_s - scene.times_s[0]) / BLOCK_S).astype(int)
@@ -313,7 +313,7 @@ def _bootstrap(
     misplaced: np.ndarray,
     rng: np.random.Generator,
 ) -> list[np.ndarray]:
-    """DRAWS of the sizes (k,), stretches drawn with replacement, ``misplaced`` (DRAWS, k) added to
+    """DRAWS of the sizes (k,), intervals drawn with replacement, ``misplaced`` (DRAWS, k) added to
     the right-hand side; what the markers hardly show is drawn nearer to zero, by the prior, than
     it may be, and scatters by as much."""
     count, total = len(grams), grams.sum(axis=0) + prior

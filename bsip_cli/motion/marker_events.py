@@ -285,7 +285,7 @@ def event(
     put_right: bool = False,
     note: str = "",
 ) -> MarkerEvent:
-    """An event of marker number ``m`` over a stretch of frames."""
+    """An event of marker number ``m`` over an interval of frames."""
     marker, segment = fit.labels[m], f"the {in_words(fit.segments[m])}"
     other = "" if partner is None else fit.labels[partner]
     start, end = float(fit.times_s[frames.start]), float(fit.times_s[frames.stop - 1])
@@ -335,7 +335,7 @@ def _of_group(group: list[MarkerEvent]) -> str:
 
 
 def pieces(hit: np.ndarray, joined: np.ndarray, longest_break: int) -> list[slice]:
-    """Stretches of hits (N,); ``joined`` frames and short breaks hold two of them together."""
+    """Intervals of hits (N,); ``joined`` frames and short breaks hold two of them together."""
     found: list[slice] = []
     for k in hit.nonzero()[0]:
         stop = found[-1].stop if found else 0

@@ -18,7 +18,7 @@ _LARGEST_M = 0.2  # a marker farther off says no more
 
 @dataclass(frozen=True)
 class Exchange:
-    """Markers number ``a`` and ``b`` bear each other's labels over a stretch of frames.
+    """Markers number ``a`` and ``b`` bear each other's labels over an interval of frames.
 
     ``statistic`` says how clearly, as in :class:`MarkerEvent`.
     """

@@ -86,7 +86,7 @@ def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
 
 
 def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
-    """Root mean square over all frames, of those of stretches of so many frames."""
+    """Root mean square over all frames, of those of intervals of so many frames."""
     frames = [gain.frames for gain in gains]
     methods = [m for m in METHODS if all(m in gain.of for gain in gains)]
     return {

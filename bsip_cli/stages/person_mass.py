@@ -59,13 +59,13 @@ def compared(
 
 
 def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
-    """From what is stated and the stretches that ingest found in these trials; warns."""
-    stretches = {}
+    """From what is stated and the intervals that ingest found in these trials; warns."""
+    intervals = {}
     for trial in trials:
         records = map(Stretch.of, unit.facts("wrench", trial)["mass_stretches"])
-        stretches[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
+        intervals[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
     static = {trial.stem for trial in trials if trial.role == "static"}
-    measured = told_mass(stretches, unit.config.ingest.mass_half_width_percent, height_m, static)
+    measured = told_mass(intervals, unit.config.ingest.mass_half_width_percent, height_m, static)
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""
@@ -76,7 +76,7 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
         note = f"mass is not known: put mass_kg into participants.tsv, because {measured.reason}"
         unit.say(note)
         return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
-    vague = measured if measured.is_known else told_mass(stretches, VAGUE_PERCENT, static=static)
+    vague = measured if measured.is_known else told_mass(intervals, VAGUE_PERCENT, static=static)
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
         unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")

@@ -78,7 +78,7 @@ def _over_time(record: ParticipantRecord) -> Iterator[Block]:
 
 def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
     """The trial with most compared frames that OM did not see, if any, and up to ten seconds of its
-    longest stretch."""
+    longest interval."""
     own = {trial.stem for trial in record.identification_trials()}
     found = [
         (trial.stem not in own, int(flags_of(trial.reconstruction, "valid").sum()), trial)

@@ -496,4 +496,4 @@ def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:
         apart = np.nanmedian(np.where(np.isnan(apart).all(axis=0), np.inf, apart), axis=0)
         if apart.min() < _SAME_M:
             return int(np.argmin(apart))
-    raise BadDataError("its course is not that of a point of the file", file=name)
+    raise BadDataError("its trajectory is not that of a point of the file", file=name)

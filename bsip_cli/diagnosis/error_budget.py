@@ -277,7 +277,7 @@ def _sum(parts: Iterable[np.ndarray]) -> np.ndarray:
 # Asked is what named faults and ordinary errors of ordinary size leave: were their size free, soft
 # tissue or a body could swallow a plate that is turned round.
 
-_LOUD = 0.5  # of the yardstick, by which a component varies at least for its course to count
+_LOUD = 0.5  # of the yardstick, by which a component varies at least for its correlation to count
 _WORDS = {
     **{name: words.replace("horizontal force", "force") for name, words in OF_THE_LAB.items()},
     "cop_ap": "the centre of pressure forwards",
@@ -288,7 +288,7 @@ _WORDS = {
 @dataclass(frozen=True)
 class Yardsticks:
     """What no good laboratory has: error of the centre of pressure [m]; of a force, part of body
-    weight [N]; and the correlation below which a course does not follow the measured one."""
+    weight [N]; and the correlation below which a signal does not follow the measured one."""
 
     cop_m: float
     force: float
@@ -336,13 +336,13 @@ def _of_trial(
     usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
 ) -> Iterator[_Large]:
     one = usual.trials[trial]
-    left, course = ground.seen(usual.left[trial]), ground.measured
+    left, measured = ground.seen(usual.left[trial]), ground.measured
     noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
     for k, name in enumerate(COMPONENTS):
         known = np.isfinite(left[:, k])
         if not known.any():
             continue
-        error, seen, yardstick = left[known, k], course[known, k], yardsticks.of(name)
+        error, seen, yardstick = left[known, k], measured[known, k], yardsticks.of(name)
         size = float(np.sqrt((error**2).mean()))
         correlation = np.nan
         if seen.std() > _LOUD * yardstick and (seen - error).std() > 0:

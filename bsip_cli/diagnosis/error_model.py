@@ -152,13 +152,13 @@ def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -
     laid = laid_out(trials)
     off = [sum((x for (_, t), x in laid.known.items() if t == k), 0.0) for k in range(len(trials))]
     residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
-    courses = residual
+    signals = residual
     for _ in range(_ROUNDS):
-        equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
+        equations = zip(trials, residual, laid.columns, laid.used, signals, strict=True)
         folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, parts))
         solution = _solution(folds, laid, adapt)
         by_trial = zip(residual, laid.columns, laid.used, strict=True)
-        left, courses = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
+        left, signals = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
     return ErrorModel(
         **vars(laid),
         trials=tuple(trials),
@@ -177,30 +177,30 @@ def _folds(
     residual: np.ndarray,
     columns: np.ndarray,
     used: np.ndarray,
-    course: np.ndarray,
+    signal: np.ndarray,
     parts: int,
 ) -> Iterator[Fold]:
-    """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
-    size, recursion = white_noise_of(one, course)
+    """White equations of a trial; ``signal`` (n, 6) is what may be left of it."""
+    size, recursion = white_noise_of(one, signal)
     rows = one.filter.innovations(columns / size[:, None], recursion)
     right = one.filter.innovations((residual / size)[..., None], recursion)[:, 0]
-    for part in np.array_split(np.arange(len(course)), min(parts, len(course))):
+    for part in np.array_split(np.arange(len(signal)), min(parts, len(signal))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
 
 
-def white_noise_of(one: TrialErrors, course: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Size (6,) and recursion (6, p) of a course (n, 6) that may be left of a trial; it is never
+def white_noise_of(one: TrialErrors, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Size (6,) and recursion (6, p) of a signal (n, 6) that may be left of a trial; it is never
     quieter than the instruments."""
-    spread = np.maximum(course.std(axis=0), one.noise)
+    spread = np.maximum(signal.std(axis=0), one.noise)
     share = one.noise / spread
     recursion = np.stack(
         [
             recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
-            for x, s in zip((course / spread).T, share, strict=True)
+            for x, s in zip((signal / spread).T, share, strict=True)
         ]
     )
-    white = one.filter.innovations((course / spread)[..., None], recursion).reshape(-1, 6)
+    white = one.filter.innovations((signal / spread)[..., None], recursion).reshape(-1, 6)
     return spread * np.maximum(white.std(axis=0), share), recursion
 
 
@@ -211,7 +211,7 @@ def left_by(
     mean: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) what the terms leave, and a course as large as it may be, they being uncertain."""
+    """(n, 6) what the terms leave, and a signal as large as it may be, they being uncertain."""
     left = residual - columns @ mean[used]
     inside = covariance[np.ix_(used, used)]
     doubt = np.stack([((a @ inside) * a).sum() for a in columns.swapaxes(0, 1)])

@@ -159,12 +159,12 @@ def _of_markers(
         turn = scene.motion.rotation[:, segment][:, None]
         angles = _nearby_angles(scene, segment)
         rate = np.gradient(angles, 1 / scene.rate_hz, axis=0)
-        courses = (angles, rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
+        signals = (angles, rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
         parts = [scene.response.parts(scene.pose_response.of(turn, [m])) for m in mine.tolist()]
         places = sd_m * np.concatenate([one[0] for one in parts], axis=2)
         together = skin_factor * np.sqrt((rms[mine] ** 2).mean()) * np.sum(parts, axis=0)
         each = [rms[m] * one for m, one in zip(mine, parts, strict=True)]
-        skin = [_following(one, courses) for one in (*each, together)]
+        skin = [_following(one, signals) for one in (*each, together)]
         yield segment, places, np.concatenate(skin, axis=2)
 
 
@@ -197,9 +197,9 @@ def _nearby_angles(scene: Scene, segment: int) -> np.ndarray:
     return nearby / max(np.sqrt((nearby**2).sum(axis=1).mean()), 1e-9)
 
 
-def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
-    """(N, 6, 3 j) of parts (3, N, 6, 3) for courses s, s' and s'' (N, j) of each angle."""
-    both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, courses, strict=True))
+def _following(parts: np.ndarray, signals: Sequence[np.ndarray]) -> np.ndarray:
+    """(N, 6, 3 j) of parts (3, N, 6, 3) for signals s, s' and s'' (N, j) of each angle."""
+    both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, signals, strict=True))
     return np.asarray(both).reshape(*parts.shape[1:3], -1)
 
 
@@ -219,7 +219,7 @@ def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
 
     It is held by a spring and a damper: far below the pace w at which it swings by itself that is
     -(a - 2 z a' / w) / w^2. So markers overshoot slightly, and late, where they turn back. Of z
-    only mean and standard deviation are known, which two courses of unit variance say as well.
+    only mean and standard deviation are known, which two signals of unit variance say as well.
     """
     pace, (mean, sd) = 2 * np.pi * SKIN_HZ, SKIN_DAMPING
     later = 2 / pace * np.gradient(acceleration, 1 / rate_hz, axis=0)
@@ -234,13 +234,13 @@ def wander(scene: Scene) -> np.ndarray:
     """
     length_s = scene.times_s[-1] - scene.times_s[0]
     halves = np.arange(1, max(1, int(2 * length_s * _SLOWER_HZ)) + 1)  # periods, two of them one
-    course = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
-    course *= WANDER_M * np.sqrt(2 / len(halves))
+    signal = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
+    signal *= WANDER_M * np.sqrt(2 / len(halves))
     force = np.nan_to_num(scene.predicted[:, :3])
-    columns = np.zeros((len(course), 6, 2, len(halves)))
+    columns = np.zeros((len(signal), 6, 2, len(halves)))
     for axis in range(2):
-        columns[:, 3:, axis] = np.cross(np.eye(3)[axis], force)[..., None] * course[:, None]
-    return columns.reshape(len(course), 6, -1)
+        columns[:, 3:, axis] = np.cross(np.eye(3)[axis], force)[..., None] * signal[:, None]
+    return columns.reshape(len(signal), 6, -1)
 
 
 def smoothing_bias(scene: Scene) -> np.ndarray:
@@ -264,8 +264,8 @@ def smoothing_bias(scene: Scene) -> np.ndarray:
 def _swinging_body(scene: Scene) -> np.ndarray:
     """(N, 6, 2) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is."""
     place = standing_place_m(scene)
-    course = move_moments(scene.predicted, place)
-    bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
+    signal = move_moments(scene.predicted, place)
+    bent = np.gradient(np.gradient(signal, axis=0), axis=0) * scene.rate_hz**2
     behind = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)
     return np.stack([-move_moments(one, -place) for one in behind], axis=-1)
 

@@ -51,7 +51,7 @@ class FaultTrial:
     def simulated(self) -> Scene:
         """What faults change: plates that read what is simulated. Of what they measured, which
         holds the residual, every gain would explain a part of it. What comes late is as measured:
-        the simulated course lacks what is fast."""
+        the simulated signal lacks what is fast."""
         return self.scene.reading(as_simulated(self.scene).plates, self.scene.measured)
 
     @property
@@ -285,16 +285,16 @@ class _Fitting:
             before = found
             for t in trials:
                 if whole or changed[t]:  # with the noise that the fit leaves
-                    course = left_by(*self.laid[t], found.mean, found.covariance)[1]
-                    pieces[t] = self._piece(t, course)
+                    left = left_by(*self.laid[t], found.mean, found.covariance)[1]
+                    pieces[t] = self._piece(t, left)
             found = self._solved(pieces, whole)
             if abs(found.log_evidence - before.log_evidence) < _CONVERGED:
                 break
         return found
 
-    def _piece(self, trial: int, course: np.ndarray) -> Piece:
+    def _piece(self, trial: int, left: np.ndarray) -> Piece:
         """Whitened by what may be left of a trial (n, 6)."""
-        return self._white(trial, *white_noise_of(self.session.trials[trial].errors, course))
+        return self._white(trial, *white_noise_of(self.session.trials[trial].errors, left))
 
     def _white(self, trial: int, size: np.ndarray, recursion: np.ndarray) -> Piece:
         filter_, (residual, columns, used) = (

@@ -78,7 +78,7 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
 
 
 def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
-    """The filter of a slower trial for courses of the whole one, with the same samples."""
+    """The filter of a slower trial for signals of the whole one, with the same samples."""
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
     stride = round(scene.rate_hz / slow(scene).rate_hz)
     return replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])

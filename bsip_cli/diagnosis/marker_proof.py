@@ -35,7 +35,7 @@ from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.samples import effective_samples
 
-ENOUGH_HZ = 10.0  # for a course of many seconds
+ENOUGH_HZ = 10.0  # for a signal of many seconds
 BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 SLIP, SLIDE = "marker_shift", "marker_slide"
@@ -127,10 +127,10 @@ def _manner(
         return at_once
     start, end = ramp_of(times_s, own)
     left = []
-    for course in (times_s >= slip.start_s, ramp(times_s, start, end)):
-        columns = np.column_stack([np.ones(len(own)), course])
+    for shape in (times_s >= slip.start_s, ramp(times_s, start, end)):
+        columns = np.column_stack([np.ones(len(own)), shape])
         left.append(own - columns @ np.linalg.lstsq(columns, own, rcond=None)[0])
-    samples = sum(effective_samples(course) for course in left[1].T)
+    samples = sum(effective_samples(one) for one in left[1].T)
     gain = np.log((left[0] ** 2).sum() / (left[1] ** 2).sum())
     if 0.5 * samples * gain - 0.5 * np.log(samples) < logit(named_from):
         return at_once
@@ -214,8 +214,8 @@ def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
     m = scene.person.markers.index(one.target)
     own, change = residual_m[:, m : m + 1], one.left(scene)[:, m : m + 1]
     rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
-    columns, course, _ = rows
-    return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
+    columns, observed, _ = rows
+    return 1 - float(((observed - columns[:, 0]) ** 2).sum() / (observed @ observed))
 
 
 def _sized(
@@ -241,16 +241,16 @@ def _sized(
     ]
     shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
     lasts = bool(scanned) and _is_throughout(scene, scanned[0])
-    columns, course, block = _in_rows(scene, shown, residual_m, with_means=lasts)
+    columns, observed, block = _in_rows(scene, shown, residual_m, with_means=lasts)
     mine = [block == number for number in np.unique(block)]
     grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
-    rights = np.stack([columns[rows].T @ course[rows] for rows in mine])
+    rights = np.stack([columns[rows].T @ observed[rows] for rows in mine])
     gram, right = grams.sum(axis=0), rights.sum(axis=0)
     least = np.linalg.lstsq(gram, right, rcond=None)[0]
-    noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
+    noise = float(((observed - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
     prior = noise * np.eye(len(typical))
     size = np.linalg.solve(gram + prior, right)
-    left = course - columns @ size
+    left = observed - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
     misplaced = _misplaced(shown, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
@@ -263,7 +263,7 @@ def _sized(
         if parameter.scan:  # known as well as it can be
             draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
     values = candidate.values(scene, typical * size)
-    share = 1 - float(left @ left) / float(course @ course)
+    share = 1 - float(left @ left) / float(observed @ observed)
     p_value = float(chi2.sf(size @ gram @ size / noise, len(size)))
     return Proof(effect, target, values, draws, share, p_value)
 
@@ -302,8 +302,8 @@ def _in_rows(
     if not with_means:
         counts = np.maximum(weight.sum(axis=0), 1)
         both = [x - np.where(weight, x, 0.0).sum(axis=0) / counts for x in both]
-    columns, course = (x[known] for x in both)
-    return columns.reshape(-1, shapes_m.shape[-1]), course.ravel(), blocks
+    columns, observed = (x[known] for x in both)
+    return columns.reshape(-1, shapes_m.shape[-1]), observed.ravel(), blocks
 
 
 def _bootstrap(

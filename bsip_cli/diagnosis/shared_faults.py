@@ -65,7 +65,7 @@ class Information:
 
 @dataclass(frozen=True, eq=False)
 class SharedTrial(FaultTrial):
-    """A trial whose forces all are as simulated: near the ends of what is valid the measured course
+    """A trial whose forces all are as simulated: near the ends of what is valid the measured signal
     bends as feet come and go beside the plates, and its slope would be taken for a delay."""
 
     standing: bool

@@ -113,8 +113,8 @@ def held_by(
     trunk = _moves_m(trunk_m)
     moves = {name: _moves_m(path) for name, path in hands_m.items()}
     still = tuple(h for h, x in moves.items() if x < STILL_M and STILLER * x < trunk)
-    counts = np.array([effective_samples(course) for course in missing_N.T])
-    error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated courses
+    counts = np.array([effective_samples(signal) for signal in missing_N.T])
+    error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated signals
     force = missing_N.mean(axis=0)
     if not still or not _is_unbalanced(force, error, weight_N):
         return None

@@ -71,10 +71,10 @@ class ClockDrift(Delay):
 def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     """(N, 6) the measured wrench less the same corrected by (N,) seconds; the trial's ends stay.
 
-    From the measured course: the simulated one holds the noise of the motion, whose derivative
+    From the measured signal: the simulated one holds the noise of the motion, whose derivative
     would make every delay seem smaller than it is.
     """
-    return scene.measured - scene.measured_course(right_times_s(scene, late_s))
+    return scene.measured - scene.measured_signal(right_times_s(scene, late_s))
 
 
 def right_times_s(scene: Scene, late_s: np.ndarray) -> np.ndarray:

@@ -59,7 +59,7 @@ class Recording:
     """Motion and measured wrench of one trial.
 
     q (N, nq), v and a (N, nv); wrench (N, 6) about the world's origin [N, N m]; use (N,) frames
-    that may enter; rate [Hz]; noise_level (N,) of the accelerations, in any unit: only its course
+    that may enter; rate [Hz]; noise_level (N,) of the accelerations, in any unit: only its shape
     counts.
     """
 
@@ -213,7 +213,7 @@ def _filtered_blocks(
         yield filtered.reshape(rows.shape[0], 6, -1), measured[mine], level
 
 
-# --- how much each component of the wrench may be trusted: residual size, its course, its memory --
+# --- how much each component of the wrench may be trusted: residual size, its shape, its memory ---
 
 # What a fit leaves has two parts: one that is always there (sensors, the model), and one that grows
 # with the noise of the accelerations, which is large where the motion is fast. Both are estimated
@@ -257,7 +257,7 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     """Noise from what a fit leaves, one series per recording."""
     residual = np.concatenate([one.residual for one in series])
     level = np.concatenate([one.noise_level for one in series])
-    fits = [_course(residual[:, c], level) for c in range(6)]
+    fits = [_size_over_time(residual[:, c], level) for c in range(6)]
     steady, with_level = np.array(fits).T
     spread = np.sqrt(_variances(steady, with_level, level))
     ends = np.cumsum([len(one.residual) for one in series])
@@ -268,7 +268,7 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     return Noise(rms, effective, len(residual), steady, with_level)
 
 
-def _course(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
+def _size_over_time(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
     """Standard deviations (steady, per level) of likely Gaussian residuals (n,)."""
     square = residual**2
     mean = max(float(square.mean()), 1e-18)

@@ -45,7 +45,7 @@ _ORIGINS = {"origin_sd_m": 0.0}  # joint centres are a term of their own, jointl
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
 _FAR_OFF = 3.5
 _READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
-_LEAST_SAMPLES = 4  # of the filtered residual, for its course to be one
+_LEAST_SAMPLES = 4  # of the filtered residual, for it to be a signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -272,10 +272,10 @@ def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.nd
     of_pelvis = np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3
     each = of_accelerations(person, trial.q[some], phi, covariance / of_pelvis[:, None, None])
     near = np.clip(np.arange(shape[0]), some[0], some[-1])
-    course = np.stack(each)
+    signal = np.stack(each)
     if len(some) > 1:
-        course = interp1d(some, course, axis=1)(near)
-    force, moment = course * trial.pelvis_noise[:, None, None]
+        signal = interp1d(some, signal, axis=1)(near)
+    force, moment = signal * trial.pelvis_noise[:, None, None]
     return force, moment
 
 
@@ -409,9 +409,9 @@ def _table(
     return pd.DataFrame(times | words | columns, copy=False)
 
 
-def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray:
-    """Courses (N, ...), each inside its own valid frames; NaN outside."""
-    flat, good = courses.reshape(len(courses), -1), ok.reshape(len(ok), -1)
+def _lowpassed(trial: _Trial, signals: np.ndarray, ok: np.ndarray) -> np.ndarray:
+    """Signals (N, ...), each inside its own valid frames; NaN outside."""
+    flat, good = signals.reshape(len(signals), -1), ok.reshape(len(ok), -1)
     found = np.full(flat.shape, np.nan)
     packed = np.packbits(good, axis=0)
     _, first, alike = np.unique(packed, axis=1, return_index=True, return_inverse=True)
@@ -419,7 +419,7 @@ def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray
         pattern, mine = good[:, column], np.flatnonzero(alike.ravel() == number)
         operator, frames = lowpass_operator(pattern, trial.rate_hz, trial.cutoff_hz)
         found[np.ix_(frames, mine)] = operator @ np.where(pattern[:, None], flat[:, mine], 0.0)
-    return found.reshape(courses.shape)
+    return found.reshape(signals.shape)
 
 
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:

@@ -43,7 +43,7 @@ def noisy(scene: Scene, seed: int, times: float = 1.0) -> Scene:
 
 
 def late(scene: Scene, delay_s: float) -> Scene:
-    """All plates show their course a moment later."""
+    """All plates show their signal a moment later."""
     at = np.clip(scene.times_s - delay_s, scene.times_s[0], None)
     plates = tuple(
         replace(plate, wrench=CubicSpline(scene.times_s, plate.wrench)(at))

@@ -211,7 +211,7 @@ def _in_full(
     log = np.array(divided) + library.log_prior
     tried: list[tuple[Tried, list[Hypothesis]]] = []
     for mine in _chosen(library, fit, log, trials):
-        likely = _apart(fit, library, mine, log)
+        likely = _far_from_each_other(fit, library, mine, log)
         starts = [_start(session, library.places[k], scores.sizes[k]) for k in likely]
         while starts:
             if (now := _with_one_more(fit, fit, starts.pop(0))) is not None:
@@ -272,7 +272,9 @@ def _with_one_more(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None
     return fitted(fit.session, (*fit.faults, one), start=noise, whole=False)
 
 
-def _apart(fit: Fitted, library: Library, mine: list[int], log: np.ndarray) -> list[int]:
+def _far_from_each_other(
+    fit: Fitted, library: Library, mine: list[int], log: np.ndarray
+) -> list[int]:
     """The likeliest values of a scan that are further apart than a finer search looks."""
     chosen: list[int] = []
     reached: list[tuple[np.ndarray, np.ndarray]] = []  # by a search from each of them

@@ -320,6 +320,6 @@ def _bootstrap(
     drawn = rng.integers(count, size=(DRAWS, count))
     undetermined = prior @ np.linalg.solve(total, rng.standard_normal((len(prior), DRAWS)))
     return [
-        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + apart
-        for one, more, apart in zip(drawn, misplaced, undetermined.T, strict=True)
+        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + rest
+        for one, more, rest in zip(drawn, misplaced, undetermined.T, strict=True)
     ]

@@ -131,8 +131,8 @@ def with_known(
 
 
 def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothesis]:
-    """Every shared fault at every plate, apart in motion and not; all plates alike are these
-    together."""
+    """Every shared fault at every plate, in motion and in quiet stance separately; all plates
+    alike are these together."""
     found = []
     for effect in _ASKED:
         targets = [effect.targets(one.scene) for one in trials]
@@ -141,8 +141,10 @@ def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothes
                 continue
             holding = tuple(t for t, mine in enumerate(targets) if target in mine)
             count = len(effect.parameters(trials[holding[0]].scene, target))
-            apart = [tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)]
-            for mine in [holding] if effect is STATED_MASS else filter(None, apart):
+            separate = [
+                tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)
+            ]
+            for mine in [holding] if effect is STATED_MASS else filter(None, separate):
                 found.append(Hypothesis(effect, target, mine, np.zeros(count)))
     return found
 

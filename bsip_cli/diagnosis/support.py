@@ -179,8 +179,8 @@ REMEDY = (
 
 def weight_share(scene: Scene) -> float:
     """Mean vertical force beyond the simulated one, part of body weight."""
-    apart = (scene.measured - scene.predicted)[scene.valid, 2]
-    return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
+    missing = (scene.measured - scene.predicted)[scene.valid, 2]
+    return float(missing.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
 def is_noticed(share: float, mass_sd: float) -> bool:
@@ -194,9 +194,9 @@ def is_noticed(share: float, mass_sd: float) -> bool:
 def agreed_share(scenes: Sequence[Scene], mass_sd: float) -> float | None:
     """What moving trials say of the stated mass, like ``weight_share``; nothing if plates and scale
     agree, or the trials do not agree with each other."""
-    apart = np.array([weight_share(one) for one in scenes])
-    share = float(np.median(apart))
-    agree = np.abs(apart - share).max() <= 0.5 * abs(share)
+    shares = np.array([weight_share(one) for one in scenes])
+    share = float(np.median(shares))
+    agree = np.abs(shares - share).max() <= 0.5 * abs(share)
     return share if agree and is_noticed(share, mass_sd) else None
 
 

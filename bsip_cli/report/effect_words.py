@@ -143,8 +143,8 @@ def usual_words(effect: str) -> str:
 # --- recordings that separate causes --------------------------------------------------------------
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
-_APART = {pair: one["record"] for one in _WORDS["apart"] for pair in one["causes"]}
-_APART["missing_joint soft_tissue"] = EFFECTS["missing_joint"].remedy
+_DISTINGUISHED_BY = {pair: one["record"] for one in _WORDS["distinguish"] for pair in one["causes"]}
+_DISTINGUISHED_BY["missing_joint soft_tissue"] = EFFECTS["missing_joint"].remedy
 _UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
 
 
@@ -154,7 +154,7 @@ def separating_recording(causes: Sequence[tuple[str, str]], most: int | None = N
     places = {one: {target for effect, target in causes if effect == one} for one in effects}
     advice = [_places(effect, causes) for effect in effects if len(places[effect]) > 1]
     for one, other in combinations(effects, 2):
-        known = _APART.get(f"{one} {other}") or _APART.get(f"{other} {one}")
+        known = _DISTINGUISHED_BY.get(f"{one} {other}") or _DISTINGUISHED_BY.get(f"{other} {one}")
         advice += [known] if known else [_own(one), _own(other)]
     each = dict.fromkeys(advice)  # once, and none that another says with more words
     steps = [one for one in each if not any(o != one and o.startswith(one) for o in each)]

@@ -148,7 +148,7 @@ def _compared(first: pd.Series) -> str:
     n = int(first["trials"])
     where = {
         "whole_trials": f"in {count(n, 'other recording')} ",
-        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"

@@ -251,12 +251,12 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         words = probability_words(one.probability)
         probability = f", probability {words}" if words else ""
         members.append(f"({_letter(k)}) {one.in_words()}{place}{probability}")
-    apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
+    steps = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
-        apart = f"weigh the person on a scale; {apart}"
+        steps = f"weigh the person on a scale; {steps}"
     return (
         f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
-        f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
+        f"{sure}{' ' if sure else ''}To distinguish them: {steps}."
     )
 
 

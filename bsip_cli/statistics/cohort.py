@@ -270,10 +270,10 @@ def methods_compared(
     differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
     why = joined(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
-    apart, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
+    between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
     of_pairs = list(differences.values())
     cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
-        ("one_way_anova", "t", "published", apart, normality, why),
+        ("one_way_anova", "t", "published", between, normality, why),
         ("repeated_measures_anova", "paired_t", "added", within, of_pairs, ""),
     )
     for name, after, origin, (test, post_hoc), normal, doubt in cases:

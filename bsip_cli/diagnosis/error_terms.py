@@ -50,7 +50,7 @@ SKIN_HZ = 8.0  # at which skin swings by itself
 # tissue would never be late, and its lag would pass for the clock's.
 SKIN_DAMPING = (1 / 2, 1 / np.sqrt(12))
 _UNKNOWN_RMS_M = 0.004  # of a marker whose residuals are not known
-WANDER_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
+DRIFT_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
 _SLOWER_HZ = 0.3
 _CUTOFFS_HZ = (3.0, 6.0, 10.0)
 _GROUPS = (
@@ -116,7 +116,7 @@ def error_terms(
         yield Term(SKIN, name, f"{SKIN} {name}", True, skin)
         yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., 2 * k : 2 * k + 2])
     yield Term(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
-    yield Term(SKIN, "", f"{SKIN} wanders", True, wander(scene))
+    yield Term(SKIN, "", f"{SKIN} drifts", True, drift(scene))
     yield Term(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
     source = as_simulated(scene)
     for effect in filter(is_of_instruments, CATALOGUE):
@@ -226,16 +226,16 @@ def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
     return np.stack([mean * later - acceleration, sd * later], axis=-1) / pace**2
 
 
-def wander(scene: Scene) -> np.ndarray:
+def drift(scene: Scene) -> np.ndarray:
     """(N, 6, 2 k) changes of the wrench if the body stood elsewhere, of unit variance together.
 
-    Slow wandering of the skin moves the whole model to and fro over the plates. It goes along with
+    Slow drift of the skin moves the whole model to and fro over the plates. It goes along with
     no joint, and is too slow to be noise of which a trial has many cycles.
     """
     length_s = scene.times_s[-1] - scene.times_s[0]
     halves = np.arange(1, max(1, int(2 * length_s * _SLOWER_HZ)) + 1)  # periods, two of them one
     signal = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
-    signal *= WANDER_M * np.sqrt(2 / len(halves))
+    signal *= DRIFT_M * np.sqrt(2 / len(halves))
     force = np.nan_to_num(scene.predicted[:, :3])
     columns = np.zeros((len(signal), 6, 2, len(halves)))
     for axis in range(2):

@@ -182,7 +182,7 @@ def soft_polyline(
     return result
 
 
-def wander(
+def slow_drift(
     t_s: np.ndarray, rng: np.random.Generator, size: float, lowest_hz: float, highest_hz: float
 ) -> np.ndarray:
     """Random slow signal of standard deviation `size`: a sum of eight sinusoids."""

@@ -21,7 +21,7 @@ from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.joints import JointCentre
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
 SKIN, TRUNK, SMOOTHING = "soft_tissue", "trunk_and_shoulders", "smoothing"
@@ -263,7 +263,7 @@ def smoothing_bias(scene: Scene) -> np.ndarray:
 
 def _swinging_body(scene: Scene) -> np.ndarray:
     """(N, 6, 2) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is."""
-    place = standing_place_m(scene)
+    place = place_of_stance_m(scene)
     signal = move_moments(scene.predicted, place)
     bent = np.gradient(np.gradient(signal, axis=0), axis=0) * scene.rate_hz**2
     behind = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)

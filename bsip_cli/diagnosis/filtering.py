@@ -11,7 +11,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
@@ -73,7 +73,7 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
-    place, rate_hz = standing_place_m(scene), scene.rate_hz / stride
+    place, rate_hz = place_of_stance_m(scene), scene.rate_hz / stride
     return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
 
 

@@ -17,7 +17,7 @@ from bsip_cli.dynamics.regressor import move_moments
 from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect, Parameter, Reported
 from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 from bsip_cli.segments import in_words
 
 UNEXPLAINED = "unexplained"
@@ -51,13 +51,13 @@ def in_channel(scene: Scene, channel: str, signal: np.ndarray) -> np.ndarray:
     """(N, 6) a signal (N,) in one component of the whole wrench, about where the person stands."""
     wrench = np.zeros((len(signal), 6))
     wrench[:, CHANNELS.index(channel)] = signal
-    return move_moments(wrench, -standing_place_m(scene))
+    return move_moments(wrench, -place_of_stance_m(scene))
 
 
 def signal_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
     """(N,) one component of a world wrench (N, 6) about the origin, moments about where the person
     stands."""
-    return move_moments(wrench, standing_place_m(scene))[:, CHANNELS.index(channel)]
+    return move_moments(wrench, place_of_stance_m(scene))[:, CHANNELS.index(channel)]
 
 
 class Component(Pattern):

@@ -282,6 +282,6 @@ def without_fast(wrench: np.ndarray, stride: int) -> np.ndarray:
     return np.where(np.isnan(wrench), np.nan, slow)
 
 
-def standing_place_m(scene: Scene) -> np.ndarray:
+def place_of_stance_m(scene: Scene) -> np.ndarray:
     """(3,) where the person stands on the ground: moments about it are small."""
     return np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)

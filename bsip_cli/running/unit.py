@@ -177,7 +177,7 @@ class Unit:
         """What the unit reads of a participant, or of the group: artifacts, refusals."""
         names, kinds = self._names(participant), self.stage.inputs
         own = [kind for kind in kinds if (SCHEMAS[kind].level == "cohort") == (not participant)]
-        paths = [path for kind in own for path in self._standing(kind, participant, names)]
+        paths = [path for kind in own for path in self._valid(kind, participant, names)]
         if participant is not None and self.trial is None:
             owners = [participant.id, *(trial.stem for trial in participant.trials)]
             before = takewhile(lambda stage: stage.label != self.stage.label, STAGES)
@@ -190,14 +190,14 @@ class Unit:
         paths = (Path(getattr(self.config, name)) for name in named)
         return {path.name: path for path in paths if path.suffix == ".toml"}
 
-    def _standing(
+    def _valid(
         self, kind: str, participant: Participant | None, names: Collection[str]
     ) -> list[Path]:
         """Artifacts of a kind that the unit reads: its own, or those of all trials below it."""
         below = participant and SCHEMAS[kind].level == "trial" and self.trial is None
         trials = participant.trials if participant and below else (self.trial,)
-        standing = (one for one in trials if self.stands(kind, one, participant, names))
-        return [self.path(kind, one, participant) for one in standing]
+        valid = (one for one in trials if self.stands(kind, one, participant, names))
+        return [self.path(kind, one, participant) for one in valid]
 
     def missing(self) -> list[str]:
         """Kinds the unit cannot do without and that are not there.
@@ -213,7 +213,7 @@ class Unit:
     def _has(self, kind: str) -> bool:
         if SCHEMAS[kind].level == "cohort" or self.participant is not None:
             whose = None if SCHEMAS[kind].level == "cohort" else self.participant
-            return bool(self._standing(kind, whose, self._names(whose)))
+            return bool(self._valid(kind, whose, self._names(whose)))
         return any(
             self.path(kind, trial, person).exists()
             for person in self.study.participants

@@ -19,7 +19,7 @@ from bsip_cli.diagnosis.patterns import (
     Warming,
     signal_of,
 )
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 from tests.diagnosis.noisy_trial import part_of_moving
 from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
 
@@ -79,7 +79,7 @@ def test_where_the_lab_has_its_origin_says_nothing(pattern, channel, scene):
 
 def test_a_moment_is_about_where_the_valid_frames_stand(scene):
     part = replace(scene, valid=scene.times_s > 3)
-    place = standing_place_m(part)
+    place = place_of_stance_m(part)
     np.testing.assert_allclose(place, [*part.q[part.valid, :2].mean(axis=0), 0])
     pushed = Curve().change(part, "fz", np.array([10.0]))
     np.testing.assert_allclose(signal_of(part, pushed, "mx"), 0, atol=1e-9)

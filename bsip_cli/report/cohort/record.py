@@ -212,7 +212,7 @@ def _in_words(found: _Found, people: Sequence[Searched]) -> str:
 
 
 def _asked(found: _Found, people: Sequence[Searched]) -> int:
-    """How many could have shown it: a recording of the same task was searched. Of standing, which is
+    """How many could have shown it: a recording of the same task was searched. Of quiet stance, which is
     no search, everybody counts."""
     tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
     of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}

@@ -382,7 +382,7 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
     shared = [
         one
         for one in causes
-        if one.effect.of_the_lab and is_corrected(one) and others <= set(one.trials)
+        if one.effect.is_of_laboratory and is_corrected(one) and others <= set(one.trials)
     ]
     shared = shared if len(others) > 1 else []
     known = {(one.effect.name, one.target) for one in shared}

@@ -123,7 +123,7 @@ def error_terms(
         for one in candidates_of(effect, scene):
             if not one.scanned:  # each place, as far as every laboratory has it
                 wrench, name = SHARE * one.signature(source), FAULT + effect.name
-                own = not effect.of_the_lab  # a constant fault is the session's
+                own = not effect.is_of_laboratory  # a constant fault is the session's
                 yield Term(name, one.target, f"{name} {one.target}", own, wrench)
 
 

@@ -86,7 +86,8 @@ class Library:
 def library_of(
     session: Session, effects: Sequence[Effect], alone: Sequence[int], prior_odds: float
 ) -> Library:
-    """alone : trials in which a fault may be by itself; in the others only what lasts is asked.
+    """alone : trials in which a fault may be by itself; in the others only what trials share is
+    asked.
     prior_odds : of one more fault in a person's recordings against none."""
     columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
     places = tuple(_places(parts, alone))
@@ -123,7 +124,7 @@ def _places(parts: Sequence[dict[Candidate, slice]], alone: Sequence[int]) -> It
     for candidate in dict.fromkeys(c for one in parts for c in one):
         asked = alone if candidate.effect.while_moving else range(len(parts))
         holding = tuple(t for t in asked if candidate in parts[t])
-        if candidate.effect.lasts and len(holding) > 1:
+        if candidate.effect.is_shared and len(holding) > 1:
             yield Place(candidate, holding)
 
 

@@ -161,7 +161,7 @@ _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault diffe
 class Uneven(Nameless):
     """Like another effect, but of another size in every interval of time."""
 
-    of_the_lab = False
+    is_of_laboratory = False
 
     def __init__(self, effect: Effect) -> None:
         self.effect = effect
@@ -195,8 +195,8 @@ def plain(effect: Effect) -> Effect:
 
 
 def can_be_uneven(effect: Effect) -> bool:
-    """A rail is touched now more, now less; what lasts is as it is."""
-    return effect.lasts and effect.name != UNEXPLAINED
+    """A rail is touched now more, now less; what trials share is as it is."""
+    return effect.is_shared and effect.name != UNEXPLAINED
 
 
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:

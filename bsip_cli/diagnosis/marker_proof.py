@@ -228,7 +228,7 @@ def _sized(
 ) -> Proof:
     """The effect's free parameters from the markers' residuals (N, m, 3), scanned ones given.
 
-    What lasts throughout shows in the means of the residuals alone, which are as sure as the
+    What is there throughout shows in the means of the residuals alone, which are as sure as the
     markers' places in the model. Intervals of BLOCK_S are taken for independent: so much noise is
     laid on each frame that all frames together say no more, and the sizes have their typical
     spread before the data.
@@ -240,8 +240,8 @@ def _sized(
         _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
     ]
     shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
-    lasts = bool(scanned) and _is_throughout(scene, scanned[0])
-    columns, observed, block = _in_rows(scene, shown, residual_m, with_means=lasts)
+    throughout = bool(scanned) and _is_throughout(scene, scanned[0])
+    columns, observed, block = _in_rows(scene, shown, residual_m, with_means=throughout)
     mine = [block == number for number in np.unique(block)]
     grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
     rights = np.stack([columns[rows].T @ observed[rows] for rows in mine])
@@ -253,7 +253,7 @@ def _sized(
     left = observed - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
-    misplaced = _misplaced(shown, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
+    misplaced = _misplaced(shown, residual_m, rng) if throughout else np.zeros((DRAWS, len(size)))
     drawn = [
         candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
         for one in _bootstrap(grams, rights, prior, misplaced, rng)

@@ -29,7 +29,7 @@ class Nameless(Effect):
     """An error of unknown cause."""
 
     name = UNEXPLAINED
-    of_the_lab = True
+    is_of_laboratory = True
     remedy = "look at plates, cables and everything that touches the person, and record again"
 
 
@@ -407,7 +407,7 @@ class Band(Pattern):
 class ClockJump(Delay, Pattern):
     """From a moment on the forces come later than before: frames or samples were lost."""
 
-    of_the_lab = False  # the moment is another one in every trial
+    is_of_laboratory = False  # the moment is another one in every trial
     LEAST_S = 1.0
     UNSEEN_S = 0.1  # as good as nothing
     APART_S, MOST = 0.5, 40

@@ -32,7 +32,7 @@ STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(
     effect
     for effect in CATALOGUE
-    if effect.of_the_lab and (is_of_instruments(effect) or isinstance(effect, Turned))
+    if effect.is_of_laboratory and (is_of_instruments(effect) or isinstance(effect, Turned))
 )
 _MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
 _ASKED = (*OF_A_LABORATORY, STATED_MASS)

@@ -24,7 +24,7 @@ class StatedMass(Effect):
     gain of all plates."""
 
     name = "stated_mass"
-    of_the_person = True
+    is_of_person = True
     remedy = "weigh the person as recorded"
     parameter = Parameter("share", "1", -0.5, 1.0, 0.01)  # scales, clothes and a week make as much
     numbers = (parameter,)
@@ -45,7 +45,7 @@ class SegmentInertia(Effect):
     """A segment whose mass, centre of mass and inertia are not those of the table."""
 
     name = "segment_inertia"
-    of_the_person = True
+    is_of_person = True
     of_the_body = True
     looks = (
         "forces that go with the acceleration of one segment in every trial, beyond what "
@@ -160,7 +160,7 @@ class WobblingMass(Effect):
 
     name = "wobbling_mass"
     on_its_segment = True
-    of_the_person = True
+    is_of_person = True
     looks = (
         "after impacts the measured force swings on at 2 to 8 Hz and dies away, which "
         "the simulated one does not"

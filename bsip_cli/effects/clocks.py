@@ -20,7 +20,7 @@ MOST_DRIFT = 0.003
 class Delay(Effect):
     """The forces come late against the markers."""
 
-    of_the_lab = True
+    is_of_laboratory = True
 
     @abstractmethod
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:

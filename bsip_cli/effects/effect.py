@@ -51,8 +51,8 @@ class Effect(ABC):
 
     name: ClassVar[str]
     numbers: ClassVar[tuple[Parameter, ...]] = ()  # its parameters, the same in every trial
-    of_the_lab: ClassVar[bool] = False  # the same in every trial of a recording session
-    of_the_person: ClassVar[bool] = False  # the same in every trial of a person
+    is_of_laboratory: ClassVar[bool] = False  # the same in every trial of a recording session
+    is_of_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
@@ -62,9 +62,9 @@ class Effect(ABC):
     least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not reported
 
     @property
-    def lasts(self) -> bool:
+    def is_shared(self) -> bool:
         """Whether trials can share it, with the same numbers."""
-        return self.of_the_lab or self.of_the_person
+        return self.is_of_laboratory or self.is_of_person
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""

@@ -44,7 +44,7 @@ class JointCentre(Effect):
     """
 
     name = "joint_centre"
-    of_the_person = True
+    is_of_person = True
     of_the_body = True
     numbers = along_xyz("shift", "m", -MOST_M, MOST_M, 0.015)
     looks = (
@@ -138,7 +138,7 @@ class MissingJoint(Effect):
     """
 
     name = "missing_joint"
-    of_the_person = True
+    is_of_person = True
     numbers = tuple(Parameter(axis, "1", -0.5, 1.5, 0.3, known_to=SHARE) for axis in AXES)
     looks = "markers of the trunk that fit badly when it bends, and moments that go with the bend"
     remedy = "put markers on both sides of T12/L1 and bend the trunk"

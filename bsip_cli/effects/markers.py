@@ -19,7 +19,7 @@ RISE_S = 0.04  # standard deviation of the ramp that smoothing leaves of a sudde
 APART_S = 0.5
 BEFORE_S = 1.0
 SKIN_M, MOMENT_S = 0.0015, 0.03  # to which place and moment are known: skin gives way
-ASTRAY_M = 0.006  # a residual that lasts, or changes its level, by this much
+ASTRAY_M = 0.006  # a residual that stays, or changes its level, by this much
 OWN_SHARE = 0.3  # of the marker's own squared residual that a shift must take away
 SHIFT = tuple(Parameter(axis, "m", -0.15, 0.15, 0.02, known_to=SKIN_M) for axis in "xyz")
 ABSORBED = Parameter("absorbed", "1", 0.0, 1.0, 0.25, (0.0, 0.5))
@@ -121,7 +121,7 @@ class MarkerShift(Effect):
 
 
 def _off_their_places(scene: Scene, residual_m: np.ndarray) -> tuple[str, ...]:
-    """Markers whose residual lasts, or changes its level, by ASTRAY_M."""
+    """Markers whose residual stays, or changes its level, by ASTRAY_M."""
     found = []
     for m, name in enumerate(scene.person.markers):
         own = residual_m[:, m]
@@ -344,7 +344,7 @@ class OverSmoothing(Effect):
     """
 
     name = "over_smoothing"
-    of_the_lab = True
+    is_of_laboratory = True
     least_named = MappingProxyType({"share": 0.3})  # less belongs to another cut-off
     looks = "peaks of the simulated force too low and too wide, in fast movements only"
     remedy = "export the trial again without the lab's filter"

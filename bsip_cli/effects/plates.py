@@ -87,7 +87,7 @@ class OfPlates(Effect):
     ``channels`` : in which channels of it; none where it is the plate's as a whole.
     """
 
-    of_the_lab = True
+    is_of_laboratory = True
     of_the_plates = True
     channels: tuple[str, ...] = ()
 
@@ -144,7 +144,7 @@ class PlateDrift(OwnSignal):
     """
 
     name = "plate_drift"
-    of_the_lab = False
+    is_of_laboratory = False
     looks = "a difference in one channel that grows evenly with time"
     remedy = "step off the plate at the beginning and at the end"
 

@@ -252,7 +252,7 @@ class MarkerEvent:
     """One marker that is not where the model may expect it.
 
     partner : the other marker of a swap, else empty.
-    start_s, end_s : a slip lasts until the trial's end, an offset fills the trial.
+    start_s, end_s : a slip holds until the trial's end, an offset fills the trial.
     size_m : length of the jump, the slip or the offset on the segment; of a swap the distance
         between the two places.
     statistic : residual over the spread it is judged against (jump, offset, a slip found as one),

@@ -47,7 +47,7 @@ class BsipError(Exception):
     def __str__(self) -> str:
         where = f"{self.file}: " if self.file else ""
         expected = f"; expected {self.expected}" if self.expected else ""
-        remedy = f". To mend it: {self.remedy}" if self.remedy else ""
+        remedy = f". To correct it: {self.remedy}" if self.remedy else ""
         return printable(f"{where}{self.found}{expected}{remedy}.")
 
     def __reduce__(self):  # crosses process borders with its data

@@ -27,7 +27,7 @@ class Delay(Effect):
         """(N,) how late the forces of each frame were recorded [s]."""
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return put_right(scene, self.late_s(scene, values))
+        return corrected(scene, self.late_s(scene, values))
 
 
 class SyncOffset(Delay):
@@ -68,7 +68,7 @@ class ClockDrift(Delay):
         return f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"
 
 
-def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
+def corrected(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     """(N, 6) the measured wrench less the same corrected by (N,) seconds; the trial's ends stay.
 
     From the measured signal: the simulated one holds the noise of the motion, whose derivative
@@ -100,7 +100,7 @@ def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
         return of_the_plates + others
     if of_the_plates.any():
         of_the_plates = CubicSpline(scene.times_s, of_the_plates)(right_times_s(scene, late_s))
-    return of_the_plates + others + put_right(scene, late_s)
+    return of_the_plates + others + corrected(scene, late_s)
 
 
 def joint_delay_s(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:

@@ -47,8 +47,8 @@ from bsip_cli.motion.marker_exchange import (
     Refit,
     as_recorded,
     exchanged,
+    exchanged_back,
     misfit_m,
-    put_right,
     refitted,
     swaps,
     with_exchanges,
@@ -90,7 +90,7 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
     if not after < _BETTER * before:
         return as_recorded(fit)
     suspected = [Exchange(a, b, whole, before / after) for a, b in pairs]
-    return put_right(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
+    return exchanged_back(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
 
 
 def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
@@ -240,7 +240,7 @@ _MOST_BLOCKS = 600  # longer ones in longer trials
 _STAYS_S = 0.5  # on each side of a slip
 _SLIP = 3.0  # spreads of what pose and step leave unexplained
 # A normal vector of three directions is this long once in 3e7 draws: 40 markers at 600 places give
-# one false alarm in a thousand trials, were the errors as the model says.
+# one false positive in a thousand trials, were the errors as the model says.
 _CHANCE = 6.0
 # Skin travels over the bone by some 15 mm in half a radian; a slip moves the pose too, by far less
 # for its size, and may not hide behind that.
@@ -397,7 +397,7 @@ class Evidence:
     events: tuple[MarkerEvent, ...]
     markers_m: np.ndarray
 
-    def put_right(self) -> bool:
+    def any_corrected(self) -> bool:
         """Some labels were exchanged back."""
         return any(one.put_right for one in self.events)
 

@@ -28,7 +28,7 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     """
     times, labels, positions = markers_from(unit.read("markers", trial))
     markers = ordered_markers(labels, positions, person.markers)
-    markers = with_labels_put_right(
+    markers = with_labels_corrected(
         markers, times, person.markers, unit.read("marker-events", trial)
     )
     scene = motion_and_wrench_of(unit, person, phi, trial)
@@ -56,7 +56,7 @@ def motion_and_wrench_of(
     )
 
 
-def with_labels_put_right(
+def with_labels_corrected(
     markers_m: np.ndarray, times_s: np.ndarray, names: tuple[str, ...], events: pd.DataFrame
 ) -> np.ndarray:
     """(N, m, 3) markers with labels exchanged back where ``ik`` did so (``marker-events``)."""

@@ -373,12 +373,12 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
     Where it did not look at it: what it names of the instruments in all others of the session, at
     least two, and what the laboratory of the person is known to have.
     """
-    looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
+    analysed, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
     here = [one for one in causes if unit.name in one.trials]
-    if unit.name in looked_at:
+    if unit.name in analysed:
         return here
     session = {t.stem for t in unit.person.trials if t.session == unit.own_trial.session}
-    others = session & set(looked_at)
+    others = session & set(analysed)
     shared = [
         one
         for one in causes

@@ -151,7 +151,7 @@ def as_simulated(scene: Scene) -> Scene:
 def _of_markers(
     scene: Scene, sd_m: float, skin_factor: float
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Per segment with markers: what markers elsewhere on it do, and what skin that follows the
+    """Per segment with markers: what misplaced markers on it do, and what skin that follows the
     angles of the joints next to it does, each marker as far as its residuals show."""
     rms = _marker_rms_m(scene)
     for segment in np.unique(scene.person.marker_segments).tolist():
@@ -227,7 +227,8 @@ def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
 
 
 def drift(scene: Scene) -> np.ndarray:
-    """(N, 6, 2 k) changes of the wrench if the body stood elsewhere, of unit variance together.
+    """(N, 6, 2 k) changes of the wrench if the body stood in another place, of unit variance
+    together.
 
     Slow drift of the skin moves the whole model to and fro over the plates. It goes along with
     no joint, and is too slow to be noise of which a trial has many cycles.

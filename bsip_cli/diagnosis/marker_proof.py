@@ -280,7 +280,7 @@ def _is_throughout(scene: Scene, from_s: float) -> bool:
 
 
 def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(DRAWS, k) what markers that sit elsewhere than the model has them, as far as these usually
+    """(DRAWS, k) what markers misplaced in the model, as far as these usually
     do, add to the right-hand side of shapes (N, m, 3, k)."""
     seen = np.isfinite(residual_m).all(axis=2).any(axis=0)
     places = np.nanmean(residual_m[:, seen], axis=0)

@@ -1,4 +1,4 @@
-"""Joints that lie elsewhere than the model has them, and one that it lacks."""
+"""Joints that are misplaced in the model, and one that it lacks."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class JointCentre(Effect):
 
     In the static trial the limb lies where its markers are, whichever centre the model has. When
     the joint turns, true and modelled limb come apart by (R_parent - R_child) shift: the limb's
-    masses are elsewhere, and its markers drag the pose along. A residual that stays the same may
-    be lost where scaling has moved the markers.
+    masses are in other places, and its markers drag the pose along. A residual that stays the
+    same may be lost where scaling has moved the markers.
     """
 
     name = "joint_centre"

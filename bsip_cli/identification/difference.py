@@ -88,7 +88,7 @@ def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resolution R = 1 - C P^-1 (P, P), and the noise's covariance R C, along the directions in
-    which C is a part w of the prior; a w above 1 (C is linearised elsewhere) counts as 1.
+    which C is a part w of the prior; a w above 1 (C is linearised at another point) counts as 1.
 
     Of parameters that keep the table's values, which have no spread, nothing is resolved.
     """

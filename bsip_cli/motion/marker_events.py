@@ -173,13 +173,13 @@ def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
     return float(np.clip(value, 0.0, _LARGEST_CORRELATION))
 
 
-# --- markers that sit elsewhere than in the calibration, throughout a trial or from a moment on ---
+# --- markers that are misplaced since the calibration, throughout a trial or from a moment on -----
 
 
 _OFFSET = 3.0  # trusted distances, and spreads of the marker about its median
 _STANDS_OUT = 5.0  # over the median of all markers' median residuals
 _LEAST_SHARE = 0.1  # of the frames show the marker
-_STAYS_S = 0.5  # at the calibrated place before, and elsewhere after
+_STAYS_S = 0.5  # at the calibrated place before, and at another after
 _IN_PLACE = 0.3  # of the later residual at most, while the marker is in its place
 
 
@@ -334,12 +334,12 @@ def _of_group(group: list[MarkerEvent]) -> str:
     )
 
 
-def pieces(hit: np.ndarray, joined: np.ndarray, longest_break: int) -> list[slice]:
-    """Intervals of hits (N,); ``joined`` frames and short breaks hold two of them together."""
+def pieces(hit: np.ndarray, bridged: np.ndarray, longest_break: int) -> list[slice]:
+    """Intervals of hits (N,); ``bridged`` frames and short breaks hold two of them together."""
     found: list[slice] = []
     for k in hit.nonzero()[0]:
         stop = found[-1].stop if found else 0
-        near = k - stop < longest_break or joined[stop:k].all()
+        near = k - stop < longest_break or bridged[stop:k].all()
         if found and near:
             found[-1] = slice(found[-1].start, int(k) + 1)
         else:

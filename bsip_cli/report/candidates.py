@@ -1,4 +1,4 @@
-"""The causes that a diagnosis looked at, with their numbers as people read them, and how small a cause
+"""The causes that a diagnosis analysed, with their numbers as people read them, and how small a cause
 might have been and still been seen.
 """
 
@@ -69,7 +69,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause that was looked at, with its numbers; ``trials`` are stems of recordings.
+    """A cause that was analysed, with its numbers; ``trials`` are stems of recordings.
 
     probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
     or trial. rms_change : what it does to the component that it changes most [N or N m].

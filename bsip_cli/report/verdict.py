@@ -265,7 +265,7 @@ def _letter(number: int) -> str:
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
-    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those looked at."""
+    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those analysed."""
     names = [trial_label(stem) for stem in trials]
     if len(everywhere) > 1 and set(trials) >= set(everywhere):
         return (
@@ -397,7 +397,7 @@ def consequences(
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
         if only_actions and (is_large(cause) or len(cause) > 1):
-            continue  # of these it is said elsewhere where to look, and what to record
+            continue  # of these another line says where to look, and what to record
         for meaning, action in _consequences_of(cause):
             text = action if only_actions else f"{meaning} {action}".rstrip()
             numbers.setdefault(text, []).append(k)

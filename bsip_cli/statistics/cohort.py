@@ -69,7 +69,7 @@ class Comparison(TestResult):
         return cls(topic, **{name: row[name] for name in row if name not in of_topic})
 
 
-def joined(*reasons: str) -> str:
+def all_reasons(*reasons: str) -> str:
     """Every reason once, in order."""
     return " ".join(dict.fromkeys(filter(None, reasons)))
 
@@ -268,7 +268,7 @@ def methods_compared(
     of_each = [lilliefors_test(column) for column in table.T]
     pairs = combinations(range(len(methods)), 2)
     differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
-    why = joined(*(test.reason for test in of_each))
+    why = all_reasons(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
     between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
     of_pairs = list(differences.values())

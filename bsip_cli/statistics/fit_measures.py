@@ -11,10 +11,10 @@ from scipy.stats import chi2
 
 from bsip_cli.statistics.samples import (
     Intervals,
+    concatenated,
     effective_samples_of_pair,
     finite_intervals,
     is_constant,
-    joined,
 )
 
 ELLIPSE_SHARE = 0.95
@@ -62,7 +62,7 @@ def fit_measures(
     """
     measured, computed = np.asarray(measured, dtype=float), np.asarray(computed, dtype=float)
     parts = finite_intervals(intervals, measured, computed)
-    m, c = joined(measured, parts), joined(computed, parts)
+    m, c = concatenated(measured, parts), concatenated(computed, parts)
     if len(m) == 0:
         return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
@@ -77,7 +77,7 @@ def correlation(x: ArrayLike, y: ArrayLike, intervals: Intervals | None = None) 
     """Pearson's r of two signals, as in `fit_measures`."""
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     parts = finite_intervals(intervals, first, second)
-    return _pearson(joined(first, parts), joined(second, parts))
+    return _pearson(concatenated(first, parts), concatenated(second, parts))
 
 
 def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
@@ -142,7 +142,7 @@ def posturography(
         raise ValueError(f"rate_hz must be positive, not {rate_hz}")
     ap, ml = np.asarray(cop_ap_m, dtype=float), np.asarray(cop_ml_m, dtype=float)
     parts = finite_intervals(intervals, ap, ml)
-    path = np.stack([joined(ap, parts), joined(ml, parts)])
+    path = np.stack([concatenated(ap, parts), concatenated(ml, parts)])
     n = path.shape[1]
     if n == 0:
         return Posturography()

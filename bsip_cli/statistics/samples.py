@@ -213,7 +213,7 @@ def finite_intervals(
     ]
 
 
-def joined(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[np.float64]:
+def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[np.float64]:
     """The samples of all intervals, one after the other."""
     if not intervals:
         return signal[:0]
@@ -245,7 +245,7 @@ def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float
     """
     series = np.asarray(x, dtype=float)
     parts = finite_intervals(intervals, series)
-    samples = joined(series, parts)
+    samples = concatenated(series, parts)
     if len(samples) < MINIMUM_SAMPLES or is_constant(samples):
         return float("nan")
     products, _ = _lagged_products(series, parts)
@@ -275,7 +275,7 @@ def effective_samples_of_pair(
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     parts = finite_intervals(intervals, first, second)
     n = sum(stop - start for start, stop in parts)
-    if n < MINIMUM_SAMPLES or any(is_constant(joined(s, parts)) for s in (first, second)):
+    if n < MINIMUM_SAMPLES or any(is_constant(concatenated(s, parts)) for s in (first, second)):
         return float("nan")
     products_x, counts = _lagged_products(first, parts)
     products_y, _ = _lagged_products(second, parts)
@@ -295,7 +295,7 @@ def _lagged_products(
     first, last = intervals[0][0], intervals[-1][1]
     present = np.zeros(last - first)
     centred = np.zeros(last - first)
-    mean = joined(series, intervals).mean()
+    mean = concatenated(series, intervals).mean()
     for start, stop in intervals:
         present[start - first : stop - first] = 1.0
         centred[start - first : stop - first] = series[start:stop] - mean

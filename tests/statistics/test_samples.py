@@ -6,11 +6,11 @@ from scipy.signal import lfilter
 
 from bsip_cli.statistics.samples import (
     adjusted_p_values,
+    concatenated,
     effective_samples,
     effective_samples_of_pair,
     finite_intervals,
     intervals_of,
-    joined,
     lilliefors_test,
 )
 
@@ -91,7 +91,7 @@ def test_split_at_what_is_not_finite_and_keep_given_breaks():
     assert finite_intervals([(3, 6), (0, 3)], x, y) == [(0, 2), (3, 4), (5, 6)]
     assert finite_intervals([(0, 1), (1, 2)], x) == [(0, 1), (1, 2)]
     assert finite_intervals([], x) == []
-    assert joined(x, [(0, 2), (5, 6)]).tolist() == [0.0, 1.0, 5.0]
+    assert concatenated(x, [(0, 2), (5, 6)]).tolist() == [0.0, 1.0, 5.0]
 
 
 @pytest.mark.parametrize("intervals", [[(0, 7)], [(-1, 2)], [(3, 2)], [(0, 3), (2, 4)]])

@@ -26,7 +26,7 @@ from bsip_cli.report.tables.model import (
     unit_label,
 )
 from bsip_cli.report.tables.paired import REASON, SHORT
-from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, all_reasons
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 # --- table 3: sway of the measured and the simulated centre of pressure ---------------------------
@@ -136,7 +136,7 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
         of_topic["n"] = results.find(topic, "paired_t").n
         tests = results.values(topic, of_error) | results.values(r, of_r)
         tests["label"] = f"{name} [{unit_label(topic.unit)}]"
-        tests["reason"] = joined(results.reasons(topic), results.reasons(r))
+        tests["reason"] = all_reasons(results.reasons(topic), results.reasons(r))
         for method in SHORT:  # tests stand in OM's row; those of other methods leave them empty
             own = tests if method == OM else dict.fromkeys(tests, "")
             of_method = _means_of_six(results, topic, method)

@@ -80,8 +80,8 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Heading("How large are the errors?"),
         Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
         Paragraph(
-            f"Root mean square (RMS), with {METHODS[record.use()]}. Every scale ends at "
-            f"{ENDS_AT:g} times what is large; an arrow: beyond. {SOURCES}",
+            f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
+            f"{ENDS_AT:g} × large. {SOURCES}",
             "note",
         ),
         *_sure(record, light),

@@ -140,11 +140,11 @@ def known_laboratory(unit: Unit) -> Known | None:
         posterior.mean[at],
         vectors * np.sqrt(np.maximum(values, 0.0)),
         table,
-        _alone(sessions),
+        alone(sessions),
     )
 
 
-def _alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
+def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
     """Size and standard deviation of what a person's sessions say in motion, each as large as
     usual before the data; where the data say nothing there is none."""
     parameters = {

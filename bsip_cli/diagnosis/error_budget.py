@@ -305,7 +305,7 @@ class Yardsticks:
 @dataclass(frozen=True)
 class _Large:
     """An error of a component in a trial: its size [N, N m, m] with standard error, as a part of
-    the yardstick; correlation of what is simulated with what is measured; chance of noise."""
+    the yardstick; correlation of what is simulated with what is measured; p-value of noise."""
 
     trial: str
     component: str
@@ -313,7 +313,7 @@ class _Large:
     standard_error: float
     part: float
     correlation: float
-    chance: float
+    p_value: float
 
 
 def large_errors(
@@ -349,9 +349,9 @@ def _of_trial(
             correlation = float(np.corrcoef(seen, seen - error)[0, 1])
         if size > yardstick or correlation < yardsticks.correlation:
             samples = max(effective_samples(error), 1.0)
-            chance = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
+            p_value = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
             spread = size / np.sqrt(2 * samples)
-            yield _Large(one.name, name, size, spread, size / yardstick, correlation, chance)
+            yield _Large(one.name, name, size, spread, size / yardstick, correlation, p_value)
 
 
 def _finding(
@@ -374,4 +374,4 @@ def _finding(
         f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more; "
         f"{along(trials, worst.component)}{interval_words((number,))}"
     )
-    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.chance, 1 - worst.chance)
+    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.p_value, 1 - worst.p_value)

@@ -161,7 +161,7 @@ def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.
 
 
 def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
-    """In how many participants each value is the smaller, and whether that is chance (exact)."""
+    """In how many participants each value is the smaller, with an exact p-value."""
     x, y = finite_pairs(x, y)
     own, other = int(np.sum(x < y)), int(np.sum(y < x))
     share = own / len(x) if len(x) else nan

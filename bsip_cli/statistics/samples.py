@@ -82,7 +82,7 @@ def adjusted_p_values(
 
 
 def p_of_one_size(estimates: np.ndarray, widths: np.ndarray) -> float:
-    """Chance that estimates (n,) of one size spread like these (Cochran's Q).
+    """p-value of estimates (n,) of one size that spread like these (Cochran's Q).
 
     widths : (n,) of their 95 % intervals, above zero, in the estimates' unit.
     """

@@ -51,9 +51,9 @@ class Whole:
 def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
     """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
     pieces whose order, and hatching of faults, are those of the first page's bar."""
-    figure = new_figure(24.0 + 6.0 * len(bars))
-    axes = figure.add_subplot()
     shown = {piece.label for bar in bars for piece in bar.pieces}
+    figure = new_figure(max(24.0, 14.0 + 2.2 * len(shown)) + 6.0 * len(bars))
+    axes = figure.add_subplot()
     fill = fills([*first, *(piece for bar in bars for piece in bar.pieces)])
     ends = np.zeros((len(bars), 2))  # left of zero, right of it
     handles: dict[str, Any] = {}

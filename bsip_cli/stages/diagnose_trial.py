@@ -41,7 +41,7 @@ _STEP = 1e-3  # of the typical size
 
 
 def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFrame:
-    """One row per parameter; where nothing is named in the trials that were looked at, a first row
+    """One row per parameter; where nothing is named in the trials that were analysed, a first row
     that says so."""
     if trials and all(one.verdict == "rejected" for one in findings):
         least = pd.Series([one.p_value for one in findings], dtype=float).min()

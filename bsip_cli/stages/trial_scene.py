@@ -117,6 +117,6 @@ def body_as_sized(unit: Unit, phi: np.ndarray) -> np.ndarray:
 
 
 def blocks_of(unit: Unit, stem: str) -> Blocks:
-    """How the diagnosis cut a trial that it looked at."""
+    """How the diagnosis cut a trial that it analysed."""
     facts = unit.facts("overall-diagnosis")
     return Blocks(**facts["blocks"][stem], block_s=facts["block_s"], folds=facts["folds"])

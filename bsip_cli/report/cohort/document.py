@@ -81,9 +81,8 @@ _FEWEST = 5  # persons among whom one can lie far out
 
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
-        title="Cohort: do motion and measured forces agree?",
-        subtitle="Ground forces measured by plates, against those computed from markers; the cohort: "
-        "all participants of this study.",
+        title="Cohort (all participants): do motion and measured forces agree?",
+        subtitle="Ground forces measured by plates, against those computed from markers.",
         front=tuple(_front(record)),
         sections=(
             Section("people", "Who took part?", (_people(record),)),

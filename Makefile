@@ -50,7 +50,7 @@ docs: $(DOCS)/ready
 
 # --- a study of your own --------------------------------------------------------------------------
 # bsip itself knows what is up to date. Paths go through the environment: whatever stands in them, the
-# shell takes each as one word. Bad data of some participants (exit code 3) are told and no failure.
+# shell takes each as one word. Bad data of some participants (exit code 3) are reported and no failure.
 
 ifneq ($(value COHORT),)
 .DEFAULT_GOAL := study
@@ -58,17 +58,17 @@ export BSIP_STUDY := $(value COHORT)
 export BSIP_OUT := $(value OUT)
 PLACES = study=$${BSIP_STUDY%/}; out=$${BSIP_OUT:-$${study}_results}
 AT_ONCE = $(or $(patsubst -j%,%,$(filter -j%,$(MAKEFLAGS))),$(JOBS))
-TOLD = case $$code in 0|3) $(BIN)/bsip show "$$out";; *) exit $$code;; esac
+SHOWN = case $$code in 0|3) $(BIN)/bsip show "$$out";; *) exit $$code;; esac
 
 study: $(READY)
-	@$(PLACES); $(BIN)/bsip run "$$study" --out "$$out" --jobs $(AT_ONCE); code=$$?; $(TOLD)
+	@$(PLACES); $(BIN)/bsip run "$$study" --out "$$out" --jobs $(AT_ONCE); code=$$?; $(SHOWN)
 
 SNAKEMAKE = BSIP="$(abspath $(BIN))/bsip" BSIP_STUDY="$$study" BSIP_OUT="$$out" \
 	$(CLUSTER)/bin/snakemake --snakefile workflow/Snakefile --profile workflow/profiles/$(PROFILE)
 
 cluster: $(READY) $(CLUSTER)/ready
 	@$(PLACES); $(SNAKEMAKE) -- everybody; failed=$$?; \
-	$(BIN)/bsip run "$$study" --out "$$out" --group; code=$$?; $(TOLD) && exit $$failed
+	$(BIN)/bsip run "$$study" --out "$$out" --group; code=$$?; $(SHOWN) && exit $$failed
 endif
 
 # --- setting up -----------------------------------------------------------------------------------

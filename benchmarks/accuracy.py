@@ -21,7 +21,7 @@ import pandas as pd
 from benchmarks.accuracy_measures import TRUTH, force_errors, segment_errors
 from benchmarks.accuracy_study import ONE_ARM, SQUATS, write_study
 from benchmarks.measure import ROOT, markdown, run_child
-from bsip_cli.statistics.methods import OM, RIVALS, RM
+from bsip_cli.statistics.methods import ALTERNATIVES, OM, RM
 
 ESTIMATORS = ("consistent", "hansen2017", "robert2017", "base")
 RECORDINGS = {
@@ -55,7 +55,7 @@ def named(table: pd.DataFrame) -> pd.DataFrame:
 def segment_table(found: pd.DataFrame) -> str:
     means = found.groupby("method").mean(numeric_only=True)
     rows = []
-    for method in (*RIVALS, *ESTIMATORS[:-1]):  # base has combinations only
+    for method in (*ALTERNATIVES, *ESTIMATORS[:-1]):  # base has combinations only
         row = means.loc[method]
         rows.append(
             [
@@ -77,7 +77,7 @@ def sex_table(found: pd.DataFrame) -> str:
     means = found.groupby(["sex", "method"]).mean(numeric_only=True)
     rows = []
     for sex, people in (("F", "women"), ("M", "men")):
-        for method in (*RIVALS, ESTIMATORS[0]):
+        for method in (*ALTERNATIVES, ESTIMATORS[0]):
             row = means.loc[(sex, method)]
             cells = [f"{row['mass']:.3f}", f"{row['centre']:.1f}", f"{row['inertias']:.1f}"]
             rows.append([people, method, *cells, f"{100 * row['all']:.1f}"])
@@ -121,7 +121,7 @@ def coverage_table(found: pd.DataFrame) -> str:
     groups = ["masses", "centres of mass", "tensors", "all"]
     rows = [
         [method, *(f"{100 * means.loc[method, group]:.1f}" for group in groups)]
-        for method in (*RIVALS, *ESTIMATORS[:-1])
+        for method in (*ALTERNATIVES, *ESTIMATORS[:-1])
     ]
     return markdown(["95 % intervals that hold the truth [%]", *groups], rows)
 
@@ -142,7 +142,7 @@ def force_table(forces: pd.DataFrame) -> str:
     errors = by_task(forces)
     means = errors.groupby("component").mean()
     rows = []
-    for method in (*RIVALS, *ESTIMATORS, TRUTH):
+    for method in (*ALTERNATIVES, *ESTIMATORS, TRUTH):
         cells = [f"{means.loc[component, method]:.1f}" for component in COMPONENTS]
         ratios = [geometric_mean(errors[method] / errors[other]) for other in (RM, TRUTH)]
         rows.append([method, *cells, *(f"{ratio:.2f}" for ratio in ratios)])

@@ -1,4 +1,4 @@
-"""How often the mass that the plates tell is right: simulated trials of every kind, none stated.
+"""How often the mass that the plates measure is right: simulated trials of every kind, none stated.
 
 Each trial is of another person, alone in its session: no static trial, no stature. "Covered" is
 the share of the told masses whose 95 % interval holds the true one.

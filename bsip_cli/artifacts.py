@@ -106,7 +106,7 @@ def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
 
 
 def write_atomically(path: Path, write) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then rename it into place.
+    """Call ``write`` with a temporary path next to ``path``, then rename it into place.
 
     NotWritableError: the disk is full, or the place cannot be written to; what was there stays.
     """

@@ -145,7 +145,7 @@ def simulate(study, preset, **options):
 def inject(source, out, participants, seed, **effects):
     """Hide effects in measured recordings, where that is physically possible.
 
-    IN is a study folder, a C3D file, or a TRC file with its MOT file beside it; OUT is the copy.
+    IN is a study folder, a C3D file, or a TRC file with its MOT file next to it; OUT is the copy.
     """
     from bsip_cli.simulate.command import inject_command
 
@@ -210,7 +210,7 @@ def compare_loads(study, out, participant, config_file, heavy, plain):
 
     Two sets of a person's recordings, with and without a load of [[loads]] in study.toml, are
     identified each on its own with the load left in the forces; printed is what that adds to each
-    segment, with its interval, beside the declared load. Needs the results of `bsip regress` and
+    segment, with its interval, next to the declared load. Needs the results of `bsip regress` and
     `bsip ik`; writes sub-XX_load-comparison.parquet.
     """
     from bsip_cli.commands.compare_loads import compare_loads as compare

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from bsip_cli.errors import UsageError, did_you_mean
 from bsip_cli.files.regular import read_toml, shipped
 
-_MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
+_MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are reported
 
 
 class Section(BaseModel):

@@ -47,12 +47,12 @@ class BsipError(Exception):
     def __str__(self) -> str:
         where = f"{self.file}: " if self.file else ""
         expected = f"; expected {self.expected}" if self.expected else ""
-        remedy = f". To mend it: {self.remedy}" if self.remedy else ""
+        remedy = f". To correct it: {self.remedy}" if self.remedy else ""
         return printable(f"{where}{self.found}{expected}{remedy}.")
 
     def __reduce__(self):  # crosses process borders with its data
-        told = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
-        return partial(type(self), **told), (self.found,)
+        known = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
+        return partial(type(self), **known), (self.found,)
 
 
 class UsageError(BsipError):

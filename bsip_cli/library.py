@@ -65,7 +65,7 @@ class Plate:
 
 
 def read(path: str | Path) -> Opened:
-    """A recording's file: a ``.c3d``, or a ``.trc`` with the file of ground forces beside it.
+    """A recording's file: a ``.c3d``, or a ``.trc`` with the file of ground forces next to it.
 
     Raises
     ------

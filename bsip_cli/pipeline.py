@@ -26,8 +26,8 @@ class Stage:
     where it exists, and is not missed where it does not. ``options`` are names of configuration
     entries: only they enter the provenance. ``module`` holds the ``function`` of a unit that does
     it. ``amends`` are kinds of its own level that earlier stages write and to which it adds rows.
-    ``part`` tells apart two steps of one name and level. ``reads_recordings``: these themselves are
-    input. ``costs_s``: of a unit beside others.
+    ``part`` distinguishes two steps of one name and level. ``reads_recordings``: these are
+    input. ``costs_s``: of a unit among others.
     """
 
     name: str

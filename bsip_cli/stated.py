@@ -13,7 +13,7 @@ BMI_KG_M2 = (12.0, 60.0)
 children go down to 12.9 (WHO 2007, third percentile); beyond 60 begins the last class that surgery
 has a name for."""
 USUAL_BMI_KG_M2 = (12.0, 40.0)
-"""Those that tell which unit is meant where none is stated; obesity of class III begins at 40."""
+"""Those that show which unit is meant where none is stated; obesity of class III begins at 40."""
 
 
 @dataclass(frozen=True)
@@ -204,17 +204,17 @@ _SEX_OF: dict[str, Sex] = {word: sex for sex, words in _WORDS.items() for word i
 _PAIR = re.compile(r"([\w?-]+)\s*[=:]\s*([\w/?-]+)")
 
 
-def sex_of(cell: str, legend: Mapping[str, Sex], beside: Collection[str] = ()) -> Sex | None:
+def sex_of(cell: str, legend: Mapping[str, Sex], column: Collection[str] = ()) -> Sex | None:
     """The sex that a cell means; "other" where it says n/a or nothing; None if it cannot be known.
 
     legend : what the codes of the table mean, as header or participants.json say.
-    beside : the column's cells in small letters: beside H (hombre, homme) an M may be mujer.
+    column : the column's cells in small letters: next to H (hombre, homme) an M may be mujer.
     """
     word = re.sub(r"^(\d+)[.,]0+$", r"\1", cell.strip())  # 1.0, as tables of numbers keep a 1
     if (known := legend.get(word) or legend.get(word.casefold())) is not None:
         return known
     meant = word.casefold().rstrip(".")
-    if meant == "m" and "h" in beside:
+    if meant == "m" and "h" in column:
         return None
     return _SEX_OF.get(meant) if meant else "other"
 

@@ -103,7 +103,7 @@ over() {  # STUDY OUT BSIP: everybody, as workflow/README.md has it, checking of
 cat > bin/bsip << 'END'
 #!/bin/sh
 [ "$1" = people ] && exec printf 'sub-01\nsub-02\n'
-case " $* " in *" --until "*) exit 0;; esac  # what they tell of the laboratory
+case " $* " in *" --until "*) exit 0;; esac  # what they show of the laboratory
 echo "$6" >> "$CALLS"
 case "$6" in
     sub-01) python3 -c "import time; held = bytearray(3_500_000_000); time.sleep(8)" ;;

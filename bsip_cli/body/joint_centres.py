@@ -141,7 +141,7 @@ def _with_trunk(
 
 
 def _between(c7: np.ndarray, suprasternale: np.ndarray, waist: np.ndarray) -> np.ndarray:
-    """The middle of the acromia, from where it lies beside the middle of these two."""
+    """The middle of the acromia, from where it lies next to the middle of these two."""
     middle = 0.5 * (c7 + suprasternale)
     up = middle - waist
     ahead = suprasternale - c7

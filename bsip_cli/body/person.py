@@ -71,8 +71,8 @@ class Person:
             own = in_joint[self.marker_segments == i]
             if self.skeleton.joint_types[i] == "spherical" and len(own):
                 _, _, axes = np.linalg.svd(own)
-                beside = own - np.outer(own @ axes[0], axes[0])
-                lost[i] |= np.linalg.norm(beside, axis=1).max() < _LEVER_M
+                lever = own - np.outer(own @ axes[0], axes[0])
+                lost[i] |= np.linalg.norm(lever, axis=1).max() < _LEVER_M
         return lost
 
     def joint_positions_m(self) -> np.ndarray:

@@ -196,7 +196,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
                 "Difference: with less without, and its 95 % interval. m: mass; mc: first moment "
                 "and I: inertia about the segment's joint; c: centre of what was added, from the "
                 "segment's origin, in the segment's frame (X anterior, Y up, Z right).",
-                *(  # where a load cannot be told from none
+                *(  # where a load cannot be distinguished from none
                     f"On the {segment_label(segment)} these recordings show no load: the mass may "
                     "be zero. Longer ones that move the segment more have narrower intervals."
                     for segment in loaded[(loaded["quantity"] == "m") & may_be_none]["segment"]
@@ -308,7 +308,8 @@ def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) 
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Changes (10 k,) of k segments with covariance, beside what is declared and to be expected."""
+    """Changes (10 k,) of k segments with covariance, against what is declared and to be
+    expected."""
 
     analysis: str
     phi: np.ndarray

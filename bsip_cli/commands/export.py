@@ -146,10 +146,10 @@ def _opensim(unit: Unit, model: str) -> Texts:
     motion = coordinates(person.skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
     wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings)[0].wrench.items()}
-    told = binary_erosion(known, iterations=_EDGE) & trial.measured & bool(trial.readings)
+    whole = binary_erosion(known, iterations=_EDGE) & trial.measured & bool(trial.readings)
     for side in SIDES:
-        told &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)
-    found = max(runs(told), key=lambda run: run[1] - run[0], default=(0, 0))
+        whole &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)
+    found = max(runs(whole), key=lambda run: run[1] - run[0], default=(0, 0))
     if found[1] - found[0] < 2:
         return texts, "no loads: the plates do not measure what acts on each foot alone"
     frames = slice(*found)
@@ -197,7 +197,7 @@ class Request:
 
     ``model_file`` is an OpenSim model to be given the inertias, ``model_bodies`` names its map;
     ``repair`` replaces tensors that no body can have by the nearest possible ones. ``what`` is
-    written into ``to``, or beside the results.
+    written into ``to``, or next to the results.
     """
 
     method: str | None = None

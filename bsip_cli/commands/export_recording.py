@@ -157,10 +157,10 @@ class _Correction:
         zeros = unit.facts("wrench").get("zeros", {})
         self._zeros = {name: np.array(x) for name, x in zeros.items() if name in self._plates}
         self.causes: dict[Cause, str] = {}  # and what else it may be
-        self._told = told = unit.read("overall-diagnosis")
+        self._diagnosis = diagnosis = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
         for cause in causes_here(unit, [*self._plates], [*self._zeros]):
-            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
+            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, diagnosis)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(
                 "what acts like it and has no name"
@@ -181,8 +181,8 @@ class _Correction:
             ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
-                self.causes[self._as_told(cause)] = others
-        here = _said_of(unit.name, told, [*EFFECTS])
+                self.causes[self._as_diagnosed(cause)] = others
+        here = _said_of(unit.name, diagnosis, [*EFFECTS])
         self.left += dict.fromkeys(
             f"{effect} {target}".strip() + f": {_why_left(effect, 'its size is not known', group)}"
             for effect, target, group in here[["effect", "target", "class_id"]].to_numpy()
@@ -190,10 +190,10 @@ class _Correction:
         )
         # what is there and has no name, or acts like a fault but not evenly
         self.left += dict.fromkeys(
-            f"{sentence}: nothing tells its course exactly"
-            for sentence in _said_of(unit.name, told, [UNEXPLAINED])["sentence"]
+            f"{sentence}: its signal is not known exactly"
+            for sentence in _said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
         )
-        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
+        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else diagnosis[:0]
         self.left += dict.fromkeys(
             f"{sentence}: {_why_left(effect, 'no size of it is known for this recording')}"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
@@ -207,14 +207,14 @@ class _Correction:
         ]
         self.left += [f"{words}: bsip reads the file so" for words in kept if words]
 
-    def _as_told(self, cause: Cause) -> Cause:
-        """With the sizes that the diagnosis tells, of the laboratory those by all its persons: for
+    def _as_diagnosed(self, cause: Cause) -> Cause:
+        """With the sizes that the diagnosis reports, of the laboratory those by all its persons: for
         ``extend`` a person's own recordings are left out of them."""
-        told = _rows_of(cause, self._told).set_index("parameter")["estimate"]
+        found = _rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
         names = [one.name for one in cause.effect.parameters(self._scene, cause.target)]
-        if not told.index.is_unique or not {*names} <= {*told.index}:
+        if not found.index.is_unique or not {*names} <= {*found.index}:
             return cause
-        return replace(cause, values=told[names].to_numpy())
+        return replace(cause, values=found[names].to_numpy())
 
     @property
     def said(self) -> list[str]:
@@ -228,7 +228,11 @@ class _Correction:
                 if _stated(reading) != reading
             ),
             *(_zero_words(*one) for one in self._zeros.items() if is_noticed(one[1])),
-            *(_words(*one, scene, self._told) for one in self.causes.items() if scene is not None),
+            *(
+                _words(*one, scene, self._diagnosis)
+                for one in self.causes.items()
+                if scene is not None
+            ),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
                 for a, b, start, end in self._swaps
@@ -407,16 +411,16 @@ def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -
     least two, and what the laboratory of the person is known to have, but for offsets of plates
     whose zero this recording shows (``zeroed``).
     """
-    looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
+    analysed, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
     here = [one for one in causes if unit.name in one.trials]
-    if unit.name in looked_at:
+    if unit.name in analysed:
         return here
     session = {t.stem for t in unit.person.trials if t.session == unit.own_trial.session}
-    others = session & set(looked_at)
+    others = session & set(analysed)
     shared = [
         one
         for one in causes
-        if one.effect.of_the_lab and is_corrected(one) and others <= set(one.trials)
+        if one.effect.is_of_laboratory and is_corrected(one) and others <= set(one.trials)
     ]
     shared = shared if len(others) > 1 else []
     known = {(one.effect.name, one.target) for one in shared}
@@ -451,25 +455,28 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
     return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
-def _rows_of(cause: Cause, told: pd.DataFrame) -> pd.DataFrame:
+def _rows_of(cause: Cause, diagnosis: pd.DataFrame) -> pd.DataFrame:
     """What the diagnosis says of a cause, a row for each number; what is known from the laboratory
     may be rejected as this person's own."""
     key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
-    return told[(told[[*key]] == pd.Series(key)).all(axis=1) & (told["verdict"] != "rejected")]
+    is_it = (diagnosis[[*key]] == pd.Series(key)).all(axis=1)
+    return diagnosis[is_it & (diagnosis["verdict"] != "rejected")]
 
 
-def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
+def _alike(cause: Cause, diagnosis: pd.DataFrame) -> list[tuple[str, str]]:
     """Effects and targets that look like a cause in these recordings."""
-    groups = set(_rows_of(cause, told)["class_id"]) - {""}
-    is_it = (told["effect"] == cause.effect.name) & (told["target"] == cause.target)
-    others = told[told["class_id"].isin(groups) & ~is_it]
+    groups = set(_rows_of(cause, diagnosis)["class_id"]) - {""}
+    is_it = (diagnosis["effect"] == cause.effect.name) & (diagnosis["target"] == cause.target)
+    others = diagnosis[diagnosis["class_id"].isin(groups) & ~is_it]
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
 
 
-def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
+def _said_of(trial: str, diagnosis: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
     """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
-    here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
-    return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
+    here = np.array([trial in names.split(", ") for names in diagnosis["trials"]], dtype=bool)
+    return diagnosis[
+        here & diagnosis["effect"].isin(effects) & (diagnosis["verdict"] != "rejected")
+    ]
 
 
 def _stated(reading: PlateReading) -> PlateReading:
@@ -484,13 +491,13 @@ def _zero_words(name: str, zero: np.ndarray) -> str:
     return f"plate {name}: its reading without load, ({force}) N, subtracted"
 
 
-def _words(cause: Cause, others: str, scene: Scene, told: pd.DataFrame) -> str:
+def _words(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -> str:
     """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
     readers of C3D know."""
-    values, rows = [], _rows_of(cause, told)
+    values, rows = [], _rows_of(cause, diagnosis)
     for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
         factor, readable = readable_unit(name, unit)
-        mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's beside it
+        mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's own
         nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
         low, high = (
             factor * (nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL)[0]
@@ -546,4 +553,4 @@ def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:
         apart = np.nanmedian(np.where(np.isnan(apart).all(axis=0), np.inf, apart), axis=0)
         if apart.min() < _SAME_M:
             return int(np.argmin(apart))
-    raise BadDataError("its course is not that of a point of the file", file=name)
+    raise BadDataError("its trajectory is not that of a point of the file", file=name)

@@ -63,12 +63,12 @@ def read_tables(
             if name is None or name in said:
                 continue
             try:
-                stated, told = _stated(replace(row, id=name), table)
+                stated, notes_of_row = _stated(replace(row, id=name), table)
             except BadDataError as refusal:
                 notes.append(str(refusal))
                 continue
             said[name] = file, stated
-            notes += told
+            notes += notes_of_row
     return said, notes
 
 
@@ -184,14 +184,14 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
         raise BadDataError(
             "no recording can be used" if unused else "no files",
             file=", ".join(map(str, given)),
-            expected="C3D files, or TRC files with their MOT or STO beside them",
+            expected="C3D files, or TRC files with their MOT or STO next to them",
             remedy="correct what is said of each" if unused else "name the folder they lie in",
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
     plan = _planned(out, link, sources, unused, participant, tables)
     _write(plan)
-    _say(_told(plan))
+    _say(_in_words(plan))
     return 3 if any(one.is_fault for one in unused) else 0
 
 
@@ -226,8 +226,8 @@ def _planned(
     of: dict[str, dict[str, StatedPerson]] = defaultdict(dict)
     for source in sorted(sources, key=lambda source: named[source.path].stem):
         of[named[source.path].participant][source.path.name] = source.stated
-    in_tables, told = read_tables(tables, of)
-    people, said = {}, [*notes, *told]
+    in_tables, about_tables = read_tables(tables, of)
+    people, said = {}, [*notes, *about_tables]
     for name, stated in sorted(of.items()):
         if name in in_tables:
             stated[in_tables[name][0].name] = in_tables[name][1]
@@ -244,7 +244,7 @@ def _planned(
 
 
 def _write(plan: _Plan) -> None:
-    """Everything into a folder beside, which gets the study's name when it is whole."""
+    """Everything into a folder next to it, which gets the study's name when it is whole."""
     out = plan.out.absolute()
     made = out.with_name(f".{out.name}.{os.getpid()}.bsip-part")
     try:
@@ -338,7 +338,7 @@ def _say(lines: Iterator[str]) -> None:
         click.echo(printable(line))
 
 
-def _told(plan: _Plan) -> Iterator[str]:
+def _in_words(plan: _Plan) -> Iterator[str]:
     for name, stated in plan.people.items():
         trials = sorted(n.stem for n in plan.named.values() if n.participant == name)
         short = listed(stem.removeprefix(f"{name}_") for stem in trials)

@@ -53,7 +53,7 @@ class Unused:
 
 @dataclass(frozen=True, eq=False)
 class Source(Found):
-    """A recording that can be read, with the forces beside a TRC; ``written``: the labels of named
+    """A recording that can be read, with the forces next to a TRC; ``written``: the labels of named
     markers as in the file."""
 
     forces: Path | None
@@ -106,7 +106,7 @@ def read_sources(
             twin = hashes.setdefault(file_hash(one.path), one.path)
             if twin != one.path:
                 unused.append(Unused(one.path, f"holds the same as {twin.name}"))
-            elif one.kind == ".trc" and (containers := _beside(one, files)):
+            elif one.kind == ".trc" and (containers := _forces_of(one, files)):
                 why = f"{containers[0].path.name}, of the same name, is used"
                 unused.append(Unused(one.path, why))
             else:
@@ -145,7 +145,7 @@ def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unus
 # --- which files are of one trial, by their names and places --------------------------------------
 
 
-def _beside(trc: Listed, files: Sequence[Listed]) -> list[Listed]:
+def _forces_of(trc: Listed, files: Sequence[Listed]) -> list[Listed]:
     """The C3D of its name in its folder, which holds markers and forces."""
     own = trc.path.with_suffix("")
     return [
@@ -163,7 +163,7 @@ def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
 
 
 def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
-    """Those of its name that lie beside a file, else in the deepest folder that holds both."""
+    """Those of its name that lie next to a file, else in the deepest folder that holds both."""
     name = trial_words(one.path)
     near = {other: _nearness(one, other) for other in others if trial_words(other.path) == name}
     return [other for other, nearness in near.items() if nearness == max(near.values())]
@@ -194,8 +194,8 @@ def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Sourc
         own = [table for table in tables if _markers_of(table, files) == [one]]
         is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
         if not tables and is_alone:  # a file was given, and not the folder
-            beside = (Listed(path, one.folders) for path in entries(one.path.parent))
-            own = _nearest(one, (file for file in beside if file.kind in ENDINGS))
+            nearby = (Listed(path, one.folders) for path in entries(one.path.parent))
+            own = _nearest(one, (file for file in nearby if file.kind in ENDINGS))
         paths = sorted(file.path for file in own)
         recording, forces = _with_forces(one, _tables(paths, unused), unused)
     else:

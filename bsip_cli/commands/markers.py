@@ -26,7 +26,7 @@ from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.segments import in_words, without_side
 
-_RIVALS = 3
+_ALTERNATIVES = 3
 
 
 def markers_command(file: Path, marker_set: str, prefix: str, write: Path | None) -> int:
@@ -103,8 +103,8 @@ def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess |
     guess = told_from(recording.labels, prefix)
     chosen, best = guess.marker_set, guess.base
     if best is None:
-        told = f"of {ranked[0].labels} labels the words tell {len(chosen.markers)}"
-        said = f"none of the shipped sets fits; {told}"
+        read = f"of {ranked[0].labels} labels the words identify {len(chosen.markers)}"
+        said = f"none of the shipped sets fits; {read}"
     else:
         added = len(chosen.markers) - best.found
         more = "" if guess.is_shipped else f"; {added} more labels by their words"
@@ -113,7 +113,7 @@ def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess |
             f"{best.required_found} of its {best.required} markers (optional ones aside), "
             f"{best.found} of {best.labels} labels{more}"
         )
-    others = [fit for fit in ranked if fit is not best][: _RIVALS - (best is not None)]
+    others = [fit for fit in ranked if fit is not best][: _ALTERNATIVES - (best is not None)]
     names = [f"  {x.marker_set.name}: {x.required_found} of {x.required} markers" for x in others]
     _say(["", f"marker set: {said}", *names])
     return guess, chosen

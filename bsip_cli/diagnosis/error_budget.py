@@ -277,7 +277,7 @@ def _sum(parts: Iterable[np.ndarray]) -> np.ndarray:
 # Asked is what named faults and ordinary errors of ordinary size leave: were their size free, soft
 # tissue or a body could swallow a plate that is turned round.
 
-_LOUD = 0.5  # of the yardstick, by which a component varies at least for its course to count
+_LOUD = 0.5  # of the yardstick, by which a component varies at least for its correlation to count
 _WORDS = {
     **{name: words.replace("horizontal force", "force") for name, words in OF_THE_LAB.items()},
     "cop_ap": "the centre of pressure forwards",
@@ -288,7 +288,7 @@ _WORDS = {
 @dataclass(frozen=True)
 class Yardsticks:
     """What no good laboratory has: error of the centre of pressure [m]; of a force, part of body
-    weight [N]; and the correlation below which a course does not follow the measured one."""
+    weight [N]; and the correlation below which a signal does not follow the measured one."""
 
     cop_m: float
     force: float
@@ -305,7 +305,7 @@ class Yardsticks:
 @dataclass(frozen=True)
 class _Large:
     """An error of a component in a trial: its size [N, N m, m] with standard error, as a part of
-    the yardstick; correlation of what is simulated with what is measured; chance of noise."""
+    the yardstick; correlation of what is simulated with what is measured; p-value of noise."""
 
     trial: str
     component: str
@@ -313,7 +313,7 @@ class _Large:
     standard_error: float
     part: float
     correlation: float
-    chance: float
+    p_value: float
 
 
 def large_errors(
@@ -336,22 +336,22 @@ def _of_trial(
     usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
 ) -> Iterator[_Large]:
     one = usual.trials[trial]
-    left, course = ground.seen(usual.left[trial]), ground.measured
+    left, measured = ground.seen(usual.left[trial]), ground.measured
     noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
     for k, name in enumerate(COMPONENTS):
         known = np.isfinite(left[:, k])
         if not known.any():
             continue
-        error, seen, yardstick = left[known, k], course[known, k], yardsticks.of(name)
+        error, seen, yardstick = left[known, k], measured[known, k], yardsticks.of(name)
         size = float(np.sqrt((error**2).mean()))
         correlation = np.nan
         if seen.std() > _LOUD * yardstick and (seen - error).std() > 0:
             correlation = float(np.corrcoef(seen, seen - error)[0, 1])
         if size > yardstick or correlation < yardsticks.correlation:
             samples = max(effective_samples(error), 1.0)
-            chance = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
+            p_value = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
             spread = size / np.sqrt(2 * samples)
-            yield _Large(one.name, name, size, spread, size / yardstick, correlation, chance)
+            yield _Large(one.name, name, size, spread, size / yardstick, correlation, p_value)
 
 
 def _finding(
@@ -374,4 +374,4 @@ def _finding(
         f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more; "
         f"{along(trials, worst.component)}{interval_words((number,))}"
     )
-    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.chance, 1 - worst.chance)
+    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.p_value, 1 - worst.p_value)

@@ -140,31 +140,31 @@ class ErrorModel(Laid):
     def without(self) -> tuple[np.ndarray, ...]:
         """Per fold the coefficients (K,), and their scales, of all other folds."""
         others = ([one for one in self.folds if one is not out] for out in self.folds)
-        return tuple(_settled(rest, self, self.adapt)[0] for rest in others)
+        return tuple(_solution(rest, self, self.adapt)[0] for rest in others)
 
 
-def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
+def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -> ErrorModel:
     """Fit coefficients, scales and what is left.
 
-    stretches : into so many each trial is cut, of which each is held out in turn.
+    parts : into so many each trial is cut, of which each is held out in turn.
     adapt : scales from the data; else everything is as large as usual.
     """
     laid = laid_out(trials)
     off = [sum((x for (_, t), x in laid.known.items() if t == k), 0.0) for k in range(len(trials))]
     residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
-    courses = residual
+    signals = residual
     for _ in range(_ROUNDS):
-        equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
-        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
-        settled = _settled(folds, laid, adapt)
-        told = zip(residual, laid.columns, laid.used, strict=True)
-        left, courses = zip(*(left_by(*one, *settled[:2]) for one in told), strict=True)
+        equations = zip(trials, residual, laid.columns, laid.used, signals, strict=True)
+        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, parts))
+        solution = _solution(folds, laid, adapt)
+        by_trial = zip(residual, laid.columns, laid.used, strict=True)
+        left, signals = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
     return ErrorModel(
         **vars(laid),
         trials=tuple(trials),
-        mean=settled[0],
-        covariance=settled[1],
-        scales=settled[2],
+        mean=solution[0],
+        covariance=solution[1],
+        scales=solution[2],
         left=left,
         folds=folds,
         adapt=adapt,
@@ -177,30 +177,30 @@ def _folds(
     residual: np.ndarray,
     columns: np.ndarray,
     used: np.ndarray,
-    course: np.ndarray,
-    stretches: int,
+    signal: np.ndarray,
+    parts: int,
 ) -> Iterator[Fold]:
-    """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
-    size, recursion = white_noise_of(one, course)
+    """White equations of a trial; ``signal`` (n, 6) is what may be left of it."""
+    size, recursion = white_noise_of(one, signal)
     rows = one.filter.innovations(columns / size[:, None], recursion)
     right = one.filter.innovations((residual / size)[..., None], recursion)[:, 0]
-    for part in np.array_split(np.arange(len(course)), min(stretches, len(course))):
+    for part in np.array_split(np.arange(len(signal)), min(parts, len(signal))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
 
 
-def white_noise_of(one: TrialErrors, course: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Size (6,) and recursion (6, p) of a course (n, 6) that may be left of a trial; it is never
+def white_noise_of(one: TrialErrors, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Size (6,) and recursion (6, p) of a signal (n, 6) that may be left of a trial; it is never
     quieter than the instruments."""
-    spread = np.maximum(course.std(axis=0), one.noise)
+    spread = np.maximum(signal.std(axis=0), one.noise)
     share = one.noise / spread
     recursion = np.stack(
         [
             recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
-            for x, s in zip((course / spread).T, share, strict=True)
+            for x, s in zip((signal / spread).T, share, strict=True)
         ]
     )
-    white = one.filter.innovations((course / spread)[..., None], recursion).reshape(-1, 6)
+    white = one.filter.innovations((signal / spread)[..., None], recursion).reshape(-1, 6)
     return spread * np.maximum(white.std(axis=0), share), recursion
 
 
@@ -211,14 +211,14 @@ def left_by(
     mean: np.ndarray,
     covariance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) what the terms leave, and a course as large as it may be, they being uncertain."""
+    """(n, 6) what the terms leave, and a signal as large as it may be, they being uncertain."""
     left = residual - columns @ mean[used]
     inside = covariance[np.ix_(used, used)]
     doubt = np.stack([((a @ inside) * a).sum() for a in columns.swapaxes(0, 1)])
     return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
 
 
-def _settled(
+def _solution(
     folds: Sequence[Fold], laid: Laid, adapt: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
     """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""
@@ -227,14 +227,14 @@ def _settled(
     for one in folds:
         gram[np.ix_(one.used, one.used)] += one.gram
         right[one.used] += one.right
-    told = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
-    told[np.unique(np.concatenate([one.used for one in folds]))] = True
-    gram, right = gram[np.ix_(told, told)], right[told]
-    place = np.cumsum(told) - 1
+    shown = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
+    shown[np.unique(np.concatenate([one.used for one in folds]))] = True
+    gram, right = gram[np.ix_(shown, shown)], right[shown]
+    place = np.cumsum(shown) - 1
     at: dict[str, np.ndarray] = {}
     for part in laid.parts:
         mine = np.arange(part.start, part.stop)
-        mine = place[mine[told[mine]]]
+        mine = place[mine[shown[mine]]]
         at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
     root = np.ones(len(right))
     for _ in range(_STEPS if adapt else 0):
@@ -245,10 +245,10 @@ def _settled(
             root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
     mean, covariance = posterior(gram, right, root)
     scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
-    if told.all():
+    if shown.all():
         return mean, covariance, scales
     whole = np.zeros(count)
-    whole[told] = mean
+    whole[shown] = mean
     return whole, covariance, scales
 
 

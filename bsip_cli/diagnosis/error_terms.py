@@ -21,7 +21,7 @@ from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.joints import JointCentre
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
 SKIN, TRUNK, SMOOTHING = "soft_tissue", "trunk_and_shoulders", "smoothing"
@@ -50,7 +50,7 @@ SKIN_HZ = 8.0  # at which skin swings by itself
 # tissue would never be late, and its lag would pass for the clock's.
 SKIN_DAMPING = (1 / 2, 1 / np.sqrt(12))
 _UNKNOWN_RMS_M = 0.004  # of a marker whose residuals are not known
-WANDER_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
+DRIFT_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
 _SLOWER_HZ = 0.3
 _CUTOFFS_HZ = (3.0, 6.0, 10.0)
 _GROUPS = (
@@ -116,14 +116,14 @@ def error_terms(
         yield Term(SKIN, name, f"{SKIN} {name}", True, skin)
         yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., 2 * k : 2 * k + 2])
     yield Term(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
-    yield Term(SKIN, "", f"{SKIN} wanders", True, wander(scene))
+    yield Term(SKIN, "", f"{SKIN} drifts", True, drift(scene))
     yield Term(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
     source = as_simulated(scene)
     for effect in filter(is_of_instruments, CATALOGUE):
         for one in candidates_of(effect, scene):
             if not one.scanned:  # each place, as far as every laboratory has it
                 wrench, name = SHARE * one.signature(source), FAULT + effect.name
-                own = not effect.of_the_lab  # a constant fault is the session's
+                own = not effect.is_of_laboratory  # a constant fault is the session's
                 yield Term(name, one.target, f"{name} {one.target}", own, wrench)
 
 
@@ -151,20 +151,20 @@ def as_simulated(scene: Scene) -> Scene:
 def _of_markers(
     scene: Scene, sd_m: float, skin_factor: float
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Per segment with markers: what markers elsewhere on it do, and what skin that follows the
-    angles of the joints beside it does, each marker as far as its residuals show."""
+    """Per segment with markers: what misplaced markers on it do, and what skin that follows the
+    angles of the joints next to it does, each marker as far as its residuals show."""
     rms = _marker_rms_m(scene)
     for segment in np.unique(scene.person.marker_segments).tolist():
         (mine,) = np.nonzero(scene.person.marker_segments == segment)
         turn = scene.motion.rotation[:, segment][:, None]
         angles = _nearby_angles(scene, segment)
         rate = np.gradient(angles, 1 / scene.rate_hz, axis=0)
-        courses = (angles, rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
+        signals = (angles, rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
         parts = [scene.response.parts(scene.pose_response.of(turn, [m])) for m in mine.tolist()]
         places = sd_m * np.concatenate([one[0] for one in parts], axis=2)
         together = skin_factor * np.sqrt((rms[mine] ** 2).mean()) * np.sum(parts, axis=0)
         each = [rms[m] * one for m, one in zip(mine, parts, strict=True)]
-        skin = [_following(one, courses) for one in (*each, together)]
+        skin = [_following(one, signals) for one in (*each, together)]
         yield segment, places, np.concatenate(skin, axis=2)
 
 
@@ -197,9 +197,9 @@ def _nearby_angles(scene: Scene, segment: int) -> np.ndarray:
     return nearby / max(np.sqrt((nearby**2).sum(axis=1).mean()), 1e-9)
 
 
-def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
-    """(N, 6, 3 j) of parts (3, N, 6, 3) for courses s, s' and s'' (N, j) of each angle."""
-    both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, courses, strict=True))
+def _following(parts: np.ndarray, signals: Sequence[np.ndarray]) -> np.ndarray:
+    """(N, 6, 3 j) of parts (3, N, 6, 3) for signals s, s' and s'' (N, j) of each angle."""
+    both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, signals, strict=True))
     return np.asarray(both).reshape(*parts.shape[1:3], -1)
 
 
@@ -219,28 +219,29 @@ def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
 
     It is held by a spring and a damper: far below the pace w at which it swings by itself that is
     -(a - 2 z a' / w) / w^2. So markers overshoot slightly, and late, where they turn back. Of z
-    only mean and standard deviation are known, which two courses of unit variance say as well.
+    only mean and standard deviation are known, which two signals of unit variance say as well.
     """
     pace, (mean, sd) = 2 * np.pi * SKIN_HZ, SKIN_DAMPING
     later = 2 / pace * np.gradient(acceleration, 1 / rate_hz, axis=0)
     return np.stack([mean * later - acceleration, sd * later], axis=-1) / pace**2
 
 
-def wander(scene: Scene) -> np.ndarray:
-    """(N, 6, 2 k) changes of the wrench if the body stood elsewhere, of unit variance together.
+def drift(scene: Scene) -> np.ndarray:
+    """(N, 6, 2 k) changes of the wrench if the body stood in another place, of unit variance
+    together.
 
-    Slow wandering of the skin moves the whole model to and fro over the plates. It goes along with
+    Slow drift of the skin moves the whole model to and fro over the plates. It goes along with
     no joint, and is too slow to be noise of which a trial has many cycles.
     """
     length_s = scene.times_s[-1] - scene.times_s[0]
     halves = np.arange(1, max(1, int(2 * length_s * _SLOWER_HZ)) + 1)  # periods, two of them one
-    course = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
-    course *= WANDER_M * np.sqrt(2 / len(halves))
+    signal = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
+    signal *= DRIFT_M * np.sqrt(2 / len(halves))
     force = np.nan_to_num(scene.predicted[:, :3])
-    columns = np.zeros((len(course), 6, 2, len(halves)))
+    columns = np.zeros((len(signal), 6, 2, len(halves)))
     for axis in range(2):
-        columns[:, 3:, axis] = np.cross(np.eye(3)[axis], force)[..., None] * course[:, None]
-    return columns.reshape(len(course), 6, -1)
+        columns[:, 3:, axis] = np.cross(np.eye(3)[axis], force)[..., None] * signal[:, None]
+    return columns.reshape(len(signal), 6, -1)
 
 
 def smoothing_bias(scene: Scene) -> np.ndarray:
@@ -263,9 +264,9 @@ def smoothing_bias(scene: Scene) -> np.ndarray:
 
 def _swinging_body(scene: Scene) -> np.ndarray:
     """(N, 6, 2) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is."""
-    place = standing_place_m(scene)
-    course = move_moments(scene.predicted, place)
-    bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
+    place = place_of_stance_m(scene)
+    signal = move_moments(scene.predicted, place)
+    bent = np.gradient(np.gradient(signal, axis=0), axis=0) * scene.rate_hz**2
     behind = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)
     return np.stack([-move_moments(one, -place) for one in behind], axis=-1)
 

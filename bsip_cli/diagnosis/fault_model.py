@@ -30,7 +30,7 @@ SIZES = (0.1, 10.0)  # of a fault, in what laboratories meet: two decades about 
 _STEPS, _FEW_STEPS = 8, 2  # of expectation and maximisation
 _ROUNDS = 12  # of what is left, at most
 _STEADY = 0.01  # change of every scale
-_SETTLED = 0.3  # change of the logarithm of the evidence
+_CONVERGED = 0.3  # change of the logarithm of the evidence
 _DIFFERENCE = 0.05  # of the typical size: a moment in time moves by a part of a frame at least
 _CORRECTIONS = 3  # of the values about which the columns are
 _EXACT = 0.02  # of the typical size
@@ -51,7 +51,7 @@ class FaultTrial:
     def simulated(self) -> Scene:
         """What faults change: plates that read what is simulated. Of what they measured, which
         holds the residual, every gain would explain a part of it. What comes late is as measured:
-        the simulated course lacks what is fast."""
+        the simulated signal lacks what is fast."""
         return self.scene.reading(as_simulated(self.scene).plates, self.scene.measured)
 
     @property
@@ -117,7 +117,7 @@ def _prior_root(session: Session, one: Hypothesis) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A trial's equations, white beside the noise of size (6,) and recursion (6, p).
+    """A trial's equations, white under the noise of size (6,) and recursion (6, p).
 
     white (6 n, K'), right (6 n,) : columns about the coefficients ``used`` (K',), and residual.
     gram (K', K'), against (K',) : their products.
@@ -285,16 +285,16 @@ class _Fitting:
             before = found
             for t in trials:
                 if whole or changed[t]:  # with the noise that the fit leaves
-                    course = left_by(*self.laid[t], found.mean, found.covariance)[1]
-                    pieces[t] = self._piece(t, course)
+                    left = left_by(*self.laid[t], found.mean, found.covariance)[1]
+                    pieces[t] = self._piece(t, left)
             found = self._solved(pieces, whole)
-            if abs(found.log_evidence - before.log_evidence) < _SETTLED:
+            if abs(found.log_evidence - before.log_evidence) < _CONVERGED:
                 break
         return found
 
-    def _piece(self, trial: int, course: np.ndarray) -> Piece:
-        """Beside what may be left of a trial (n, 6)."""
-        return self._white(trial, *white_noise_of(self.session.trials[trial].errors, course))
+    def _piece(self, trial: int, left: np.ndarray) -> Piece:
+        """Whitened by what may be left of a trial (n, 6)."""
+        return self._white(trial, *white_noise_of(self.session.trials[trial].errors, left))
 
     def _white(self, trial: int, size: np.ndarray, recursion: np.ndarray) -> Piece:
         filter_, (residual, columns, used) = (
@@ -325,8 +325,8 @@ class _Fitting:
         scales = np.array([self.root[mine[0]] for mine in self.session.adapts])
         log -= 0.5 * WEIGHT * float((2 * np.log(scales) + 1 / scales**2 - 1).sum())
         each = np.array([one.log_likelihood(mean) for one in pieces])
-        told = self.root.copy(), mean, covariance, each, log
-        return Fitted(self.session, self.faults, self.starts, tuple(pieces), *told)
+        copied = self.root.copy(), mean, covariance, each, log
+        return Fitted(self.session, self.faults, self.starts, tuple(pieces), *copied)
 
 
 def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -338,7 +338,7 @@ def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]
     return gram, against
 
 
-# --- the likeliest sizes of one more fault beside a fit -------------------------------------------
+# --- the likeliest sizes of one more fault given a fit --------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,13 +415,13 @@ def refined(fit: Fitted, one: Hypothesis) -> Hypothesis:
         return one.with_values(session, values)
 
     def of(x: np.ndarray) -> tuple[np.ndarray, _Marginal]:
-        told = _marginal(fit, at(x))
-        ridge = told.information + np.eye(len(told.pull)) / SIZES[1] ** 2
-        return np.linalg.solve(ridge, told.pull), told
+        scores = _marginal(fit, at(x))
+        ridge = scores.information + np.eye(len(scores.pull)) / SIZES[1] ** 2
+        return np.linalg.solve(ridge, scores.pull), scores
 
     def left(x: np.ndarray) -> float:
-        size, told = of(x)
-        return -float(told.pull @ size)
+        size, scores = of(x)
+        return -float(scores.pull @ size)
 
     start = np.zeros(int(scanned.sum()))
     simplex = {"initial_simplex": np.vstack([start, np.eye(len(start))])}

@@ -22,8 +22,12 @@ from bsip_cli.effects.scene import Scene
 _BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
 _BATCH = 60  # candidates whose signatures are filtered at a time
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
-_UNTOLD = 1e-3  # part of a parameter, squared, that lies in what the motion does not tell
-_TOLD = 1e-5  # of what the likeliest combination of parameters is told: less is rounding
+_UNDETERMINED = (
+    1e-3  # part of a parameter, squared, that lies in what the motion does not determine
+)
+_DETERMINED = (
+    1e-5  # of what the likeliest combination of parameters is determined: less is rounding
+)
 _MEDIANS = [np.nan, *chi2.median(np.arange(1, 20))]
 
 
@@ -83,7 +87,8 @@ class Library:
 def library_of(
     session: Session, effects: Sequence[Effect], alone: Sequence[int], prior_odds: float
 ) -> Library:
-    """alone : trials in which a fault may be by itself; in the others only what lasts is asked.
+    """alone : trials in which a fault may be by itself; in the others only what trials share is
+    asked.
     prior_odds : of one more fault in a person's recordings against none."""
     columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
     scenes = [one.scene for one in session.trials]
@@ -124,8 +129,8 @@ def _places(
         effect, target = candidate.effect, candidate.target
         asked = alone if effect.while_moving else range(len(parts))
         held_in = (t for t in asked if candidate in parts[t])
-        holding = tuple(t for t in held_in if effect.is_shared(scenes[t], target))
-        if effect.lasts and len(holding) > 1:
+        holding = tuple(t for t in held_in if effect.is_shared_at(scenes[t], target))
+        if effect.is_shared and len(holding) > 1:
             yield Place(candidate, holding)
 
 
@@ -184,12 +189,12 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
         log_factor[mine] = logsumexp(gains, axis=1) - np.log(len(_BEFORE))
         best = added[np.arange(len(mine)), np.argmax(gains, axis=1)]
         likeliest = np.einsum("nki,ni->nk", vectors, along / best)
-        told = values > 1.0  # of which the recording tells a typical size
-        squares = (along**2 / values * told).sum(axis=1)
+        determined = values > 1.0  # of which the recording shows a typical size
+        squares = (along**2 / values * determined).sum(axis=1)
         for n, k in enumerate(mine):
             sizes[k], known[k], place = likeliest[n], information[n], library.places[k]
-            if len(place.trials) == 1 and told[n].any():
-                ratio = float(squares[n] / _MEDIANS[int(told[n].sum())])
+            if len(place.trials) == 1 and determined[n].any():
+                ratio = float(squares[n] / _MEDIANS[int(determined[n].sum())])
                 saved[place.trials[0]].setdefault(place.candidate.effect, []).append(ratio)
     medians = [[float(np.median(x)) for x in one.values()] or [1.0] for one in saved]
     inflation = np.array([max(1.0, float(np.median(one))) for one in medians])
@@ -251,9 +256,9 @@ def named_size(sd: float, needed: float) -> float:
 
 def _spreads(information: np.ndarray) -> np.ndarray:
     """(k,) standard deviations of an effect's sizes [typical], infinite where the motion does not
-    tell them: a hinge hides a shift along its axis."""
+    determine them: a hinge hides a shift along its axis."""
     squares, directions = np.linalg.eigh(information)
-    told = squares > _TOLD * max(squares[-1], 1.0)
-    spread = np.sqrt((directions[:, told] ** 2 / squares[told]).sum(axis=1))
-    hidden = (directions[:, ~told] ** 2).sum(axis=1) > _UNTOLD
+    determined = squares > _DETERMINED * max(squares[-1], 1.0)
+    spread = np.sqrt((directions[:, determined] ** 2 / squares[determined]).sum(axis=1))
+    hidden = (directions[:, ~determined] ** 2).sum(axis=1) > _UNDETERMINED
     return np.where(hidden, np.inf, spread)

@@ -190,7 +190,7 @@ def _prior_of(library: Library, one: Hypothesis) -> float:
 
 def one_round(session: Session, library: Library, fit: Fitted) -> list[Tried]:
     """The likeliest candidates in full given a fit's faults, the likeliest first; how much of them
-    is chance is seen beside the best one."""
+    is chance is seen next to the best one."""
     tried = _in_full(session, library, fit)
     if not tried:
         return []
@@ -211,10 +211,10 @@ def _in_full(
     log = np.array(divided) + library.log_prior
     tried: list[tuple[Tried, list[Hypothesis]]] = []
     for mine in _chosen(library, fit, log, trials):
-        likely = _apart(fit, library, mine, log)
+        likely = _far_from_each_other(fit, library, mine, log)
         starts = [_start(session, library.places[k], scores.sizes[k]) for k in likely]
         while starts:
-            if (now := _beside(fit, fit, starts.pop(0))) is not None:
+            if (now := _with_one_more(fit, fit, starts.pop(0))) is not None:
                 prior = float(logsumexp(library.log_prior[mine]))
                 tried.append((Tried(now.faults[-1], now, prior), starts))
                 break
@@ -226,12 +226,12 @@ def _in_full(
 
 
 def _polished(fit: Fitted, one: Tried, starts: Sequence[Hypothesis]) -> Tried:
-    """With the best of other moments, frequencies or windows, and these sought once more beside the
+    """With the best of other moments, frequencies or windows, and these sought once more given the
     noise that it leaves: before it was found, it was taken for noise."""
-    fits = [one.fit, *(_beside(fit, fit, start) for start in starts)]
+    fits = [one.fit, *(_with_one_more(fit, fit, start) for start in starts)]
     now = max((x for x in fits if x is not None), key=lambda x: x.log_evidence)
     quiet = fitted(fit.session, fit.faults, start=now, whole=False, same_noise=True)
-    again = _beside(fit, quiet, now.faults[-1])
+    again = _with_one_more(fit, quiet, now.faults[-1])
     now = max(now, again or now, key=lambda x: x.log_evidence)
     return replace(one, fault=now.faults[-1], fit=now)
 
@@ -263,7 +263,7 @@ def _chosen(
             return
 
 
-def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
+def _with_one_more(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
     """The model with one more fault, sized given the noise of a fit with the same others; None if
     it is not possible."""
     one = sized(noise, refined(noise, one))
@@ -272,7 +272,9 @@ def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
     return fitted(fit.session, (*fit.faults, one), start=noise, whole=False)
 
 
-def _apart(fit: Fitted, library: Library, mine: list[int], log: np.ndarray) -> list[int]:
+def _far_from_each_other(
+    fit: Fitted, library: Library, mine: list[int], log: np.ndarray
+) -> list[int]:
     """The likeliest values of a scan that are further apart than a finer search looks."""
     chosen: list[int] = []
     reached: list[tuple[np.ndarray, np.ndarray]] = []  # by a search from each of them

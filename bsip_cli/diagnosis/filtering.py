@@ -11,7 +11,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
@@ -68,17 +68,17 @@ def recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray
 
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
-    """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
+    """Low-pass and decimation inside the valid intervals, moments about where the person stands."""
     stride = stride_to(scene.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
-    place, rate_hz = standing_place_m(scene), scene.rate_hz / stride
+    place, rate_hz = place_of_stance_m(scene), scene.rate_hz / stride
     return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
 
 
 def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
-    """The filter of a slower trial for courses of the whole one, with the same samples."""
+    """The filter of a slower trial for signals of the whole one, with the same samples."""
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
     stride = round(scene.rate_hz / slow(scene).rate_hz)
     return replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])

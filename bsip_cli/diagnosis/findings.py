@@ -60,9 +60,9 @@ class Finding:
 
 def scope_of(effect: Effect) -> str:
     """How far a fault reaches, if it is there."""
-    if effect.of_the_lab:
+    if effect.is_of_laboratory:
         return "laboratory"
-    return "person" if effect.of_the_person else "trial"
+    return "person" if effect.is_of_person else "trial"
 
 
 def findings_of(

@@ -18,7 +18,7 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
 
 FOLDS = 5
-BLOCK_S = 1.0  # stretches of time that stand for independent ones
+BLOCK_S = 1.0  # intervals of time that stand for independent ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def held_out(fit: Fitted) -> HeldOut:
 
 
 def _linear(fit: Fitted) -> np.ndarray:
-    """(K,) False for moments, frequencies and windows: without the second that tells them nothing
+    """(K,) False for moments, frequencies and windows: without the second that shows them nothing
     does, so they stay as all seconds have them."""
     kept = np.ones(len(fit.mean), dtype=bool)
     for number, one in enumerate(fit.faults):
@@ -145,8 +145,8 @@ def _means(
             right = (piece.right + more.get(t, 0.0))[rows]
             its[np.ix_(piece.used, piece.used)] -= white.T @ white
             to[piece.used] -= white.T @ right
-        told = np.ix_(kept, kept)
-        means[fold, kept] = posterior(its[told], to[kept], fit.root[kept])[0]
+        block = np.ix_(kept, kept)
+        means[fold, kept] = posterior(its[block], to[kept], fit.root[kept])[0]
     return means
 
 
@@ -161,7 +161,7 @@ _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault diffe
 class Uneven(Nameless):
     """Like another effect, but of another size in every interval of time."""
 
-    of_the_lab = False
+    is_of_laboratory = False
 
     def __init__(self, effect: Effect) -> None:
         self.effect = effect
@@ -185,8 +185,8 @@ class Uneven(Nameless):
         return self.effect.reported(scene, target, values)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        told = self.effect.sentence(scene, target, values)
-        return f"of unknown cause: {told}, but not evenly"
+        known = self.effect.sentence(scene, target, values)
+        return f"of unknown cause: {known}, but not evenly"
 
 
 def plain(effect: Effect) -> Effect:
@@ -195,8 +195,8 @@ def plain(effect: Effect) -> Effect:
 
 
 def can_be_uneven(effect: Effect) -> bool:
-    """A rail is touched now more, now less; what lasts is as it is."""
-    return effect.lasts and effect.name != UNEXPLAINED
+    """A rail is touched now more, now less; what trials share is as it is."""
+    return effect.is_shared and effect.name != UNEXPLAINED
 
 
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:

@@ -1,17 +1,17 @@
 """The shared faults of all who were recorded in one laboratory, as one small Gaussian model.
 
-Each person's recordings tell something of the shared faults (``shared_faults``): of theta + d, with
+Each person's recordings show something of the shared faults (``shared_faults``): of theta + d, with
 theta the laboratory's sizes and d the person's own deviation, since nobody's body and skin are just
 as the model has them. How large deviations are follows from the data, by kind of number (a random
 effect, its variance by expectation and maximisation: Dempster 1977, J R Stat Soc B 39; Laird and
-Ware 1982, Biometrics 38). What is told in motion and by who stands still are coordinates of their
+Ware 1982, Biometrics 38). What is shown in motion and in quiet stance are coordinates of their
 own, E d what a person deviates in both. With J and h a person's precision and pull and T^2 the
 variance of d, the person adds J - J E V E' J and h - J E V E' h to what is known of the
 coordinates, V = (E' J E + T^-2)^-1. These are E theta, and for who stands still a difference more
 in all persons alike, whose size follows from the data too: plates may be moved before they walk.
 
 What a body's model gets wrong in motion it may get wrong in every body. No scatter of persons shows
-it: a share of the variance of what one person tells counts as the same in all (an intraclass
+it: a share of the variance of what one person shows counts as the same in all (an intraclass
 correlation: Kish 1965, Survey Sampling, 5.4), in every direction of the coordinates.
 """
 
@@ -34,21 +34,21 @@ from bsip_cli.effects.effect import Parameter
 _STEPS = 100  # of expectation and maximisation, at most
 _STEADY = 0.01  # change of every scale
 _BLOCK = 32  # persons
-_UNTOLD = 1e-10  # of the precision of what is told best
+_UNDETERMINED = 1e-10  # of the precision of what is determined best
 
 
 @dataclass(frozen=True, eq=False)
 class Persons:
-    """What M persons tell of C coordinates [typical sizes], which are K numbers in motion and, some
+    """What M persons show of C coordinates [typical sizes], which are K numbers in motion and, some
     of them, of who stands still too.
 
-    precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is told.
+    precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is shown.
     numbers (C,) : which number a coordinate is; the first K are those in motion.
     usual (M, K) : standard deviation of the deviations before the data. groups (K,) : whose
     deviations have one scale; behind them as many groups of differences of who stands still.
     ordinary (K,) : what every laboratory has of a fault. alike : share of the variance of what one
-    tells in motion that is the same in all. moments_s : mean and standard deviation of those that
-    tell of the clock, from the start of a recording.
+    shows in motion that is the same in all. moments_s : mean and standard deviation of those that
+    show the clock, from the start of a recording.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -83,7 +83,7 @@ class Persons:
         return self.count // 2 + self.groups[self.numbers[self.standing]]
 
     def blocks(self, who: Iterable[int] | None = None) -> Iterator[tuple[np.ndarray, ...]]:
-        """precision, pull and usual of all or some, a few at a time: beside what is kept of each
+        """precision, pull and usual of all or some, a few at a time: but for what is kept of each
         person, no memory grows with their number."""
         mine = np.arange(len(self.pull)) if who is None else np.array([*who])
         for k in range(0, len(mine), _BLOCK):
@@ -113,7 +113,7 @@ def persons_of(
     known = {
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
     }
-    known |= {replace(x, standing=False): p for x, p in known.items()}  # none may tell it in motion
+    known |= {replace(x, standing=False): p for x, p in known.items()}  # none may show it in motion
     coordinates = tuple(sorted(known, key=lambda one: (one.standing, one)))
     moving = [one for one in coordinates if not one.standing]
     is_mass = np.array([one.effect == STATED_MASS.name for one in moving])
@@ -156,7 +156,7 @@ class Sums:
     log_factor: float
 
     def with_(self, others: Sums) -> Sums:
-        """And what some others tell."""
+        """And what some others show."""
         return Sums(
             self.precision + others.precision,
             self.pull + others.pull,
@@ -187,15 +187,15 @@ def _deviations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(M, K, K) covariance of each person's deviations (M, K) given the laboratory's sizes, and
     (M,) logarithm of how much less volume than before the data."""
-    told = both.T @ precision @ both
-    inner = spread[:, :, None] * told * spread[:, None] + np.eye(spread.shape[1])
+    known = both.T @ precision @ both
+    inner = spread[:, :, None] * known * spread[:, None] + np.eye(spread.shape[1])
     variance = spread[:, :, None] * np.linalg.inv(inner) * spread[:, None]
     return variance, np.linalg.slogdet(inner)[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """What is told of k more numbers [typical]: precision (k, k) and pull (k,)."""
+    """What is known of k more numbers [typical]: precision (k, k) and pull (k,)."""
 
     precision: np.ndarray
     pull: np.ndarray
@@ -237,7 +237,7 @@ class Posterior:
     squares: np.ndarray
 
     def offset(self, sums: Sums, directions: np.ndarray) -> Offset:
-        """What is told of sizes along ``directions`` (C, k) that some persons have on top of this.
+        """What is known of sizes along ``directions`` (C, k) that some persons have on top of this.
 
         sums : of these persons, who are among those that this rests on.
         """
@@ -268,7 +268,7 @@ def anything(persons: Persons, scale: np.ndarray) -> np.ndarray:
 def scales_of(
     persons: Persons, *parts: Iterable[int], start: np.ndarray | None = None
 ) -> np.ndarray:
-    """(G,) of the deviations and of who stands still, of the largest evidence beside any faults of
+    """(G,) of the deviations and of who stands still, of the largest evidence given any faults of
     the laboratory; of other sizes in each part of its persons. start (G,) : near to it."""
     everybody = [list(one) for one in parts] or [list(range(len(persons.pull)))]
     scale = np.ones(persons.count) if start is None else start
@@ -292,9 +292,9 @@ def _squares(persons: Persons, scale: np.ndarray, who: Sequence[int]) -> np.ndar
         mean = np.einsum("mij,mj->mi", variance, pull @ both) - taken @ found.mean
         square = mean**2 + np.diagonal(variance, axis1=1, axis2=2)
         square += (taken @ found.covariance * taken).sum(axis=2)
-        told = (np.diagonal(precision, axis1=1, axis2=2) > 0) @ both > 0
-        np.add.at(total[0], groups, (square / usual**2 * told).sum(axis=0))
-        np.add.at(total[1], groups, told.sum(axis=0))
+        shown = (np.diagonal(precision, axis1=1, axis2=2) > 0) @ both > 0
+        np.add.at(total[0], groups, (square / usual**2 * shown).sum(axis=0))
+        np.add.at(total[1], groups, shown.sum(axis=0))
     differences = scale[persons.of_differences] ** 2 * found.squares[len(groups) :]
     np.add.at(total[0], persons.of_differences, differences)
     np.add.at(total[1], persons.of_differences, 1)
@@ -303,19 +303,19 @@ def _squares(persons: Persons, scale: np.ndarray, who: Sequence[int]) -> np.ndar
 
 def alike_in(persons: Persons) -> np.ndarray:
     """(C, L) root of the covariance of what is the same in all persons in motion: a share of what
-    one of them has, whose deviation is as usual. Their scatter tells nothing of it."""
-    tell = (np.diagonal(persons.precision, axis1=1, axis2=2) > 0).sum(axis=0)
+    one of them has, whose deviation is as usual. Their scatter shows nothing of it."""
+    counts = (np.diagonal(persons.precision, axis1=1, axis2=2) > 0).sum(axis=0)
     moving = [
         k
         for k, one in enumerate(persons.coordinates)
-        if tell[k] and not one.standing and one.effect != STATED_MASS.name
+        if counts[k] and not one.standing and one.effect != STATED_MASS.name
     ]
-    one_of = np.sqrt(np.outer(tell, tell))[np.ix_(moving, moving)]
+    one_of = np.sqrt(np.outer(counts, counts))[np.ix_(moving, moving)]
     everybody = sums_of(persons, np.ones(persons.count)).precision[np.ix_(moving, moving)]
     values, vectors = np.linalg.eigh(everybody / one_of)
-    told = values > _UNTOLD * values.max(initial=0.0)
-    root = np.zeros((len(persons.coordinates), int(told.sum())))
-    root[moving] = vectors[:, told] / np.sqrt(values[told])
+    shown = values > _UNDETERMINED * values.max(initial=0.0)
+    root = np.zeros((len(persons.coordinates), int(shown.sum())))
+    root[moving] = vectors[:, shown] / np.sqrt(values[shown])
     return np.sqrt(persons.alike) * np.column_stack([root, _growing_lag(persons)])
 
 
@@ -340,7 +340,7 @@ def log_prior_of_scales(scale: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Pooled:
-    """All that a laboratory's persons tell, to be kept: nothing of it grows with their number.
+    """All that a laboratory's persons show, to be kept: nothing of it grows with their number.
 
     precision (C, C), pull (C,) : of the sizes, as in ``Sums``. spread (C,) : standard deviation of
     a person's deviations, of each number. root (C, L) : of the covariance of the sizes before the

@@ -93,7 +93,7 @@ def _each(lab: Laboratory) -> Iterator[tuple[int, Sums]]:
 
 
 def _from_each_on(lab: Laboratory, order: Sequence[int]) -> Iterator[tuple[int, Sums]]:
-    """Place in the order, and what all from there on tell: at least two, and not everybody."""
+    """Place in the order, and what all from there on show: at least two, and not everybody."""
     together = None
     for k in range(len(order) - 1, 0, -1):
         own = sums_of(lab.persons, lab.scale, (order[k],))
@@ -106,7 +106,7 @@ def _likeliest(
     lab: Laboratory, causes: Sequence[Cause], asked: Iterable[tuple[int, Sums]]
 ) -> list[int]:
     """The sets of sessions that deviate most, with the scales of all: only of these the scales
-    beside their deviation are fitted, which among many sessions are the same."""
+    jointly with their deviation are fitted, which among many sessions are the same."""
     posterior = lab.posterior()
     odds = {}
     for k, own in asked:
@@ -116,7 +116,7 @@ def _likeliest(
 
 
 def _by_the_others(lab: Laboratory, sessions: tuple[int, ...]) -> tuple[Sums, Sums]:
-    """What all tell and what some sessions tell, with the scales of deviations from the others'
+    """What all show and what some sessions show, with the scales of deviations from the others'
     laboratory and from their own."""
     persons = lab.persons
     others = np.setdiff1d(np.arange(len(persons.pull)), sessions)

@@ -191,8 +191,8 @@ class Laboratory:
         """What is kept of it for the diagnosis of each person."""
         persons, sums = self.persons, self.sums
         spread = np.median(persons.usual, axis=0) * self.scale[persons.groups]
-        told = sums.precision, sums.pull, spread[persons.numbers]
-        return Pooled(persons.coordinates, *told, self._root())
+        parts = sums.precision, sums.pull, spread[persons.numbers]
+        return Pooled(persons.coordinates, *parts, self._root())
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
@@ -295,7 +295,7 @@ def _verdict(
 
 def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
     """(D, k) sizes [typical] of a cause from the posterior if it is there, over how large the
-    persons' deviations may be: few persons do not tell it."""
+    persons' deviations may be: few persons do not determine it."""
     cause = lab.causes[k]
     touched = lab.persons.groups[lab.persons.numbers[cause.directions.any(axis=1)]]
     offsets, logs = [], []

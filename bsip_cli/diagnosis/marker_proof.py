@@ -35,7 +35,7 @@ from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.samples import effective_samples
 
-ENOUGH_HZ = 10.0  # for a course of many seconds
+ENOUGH_HZ = 10.0  # for a signal of many seconds
 BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 SLIP, SLIDE = "marker_shift", "marker_slide"
@@ -79,8 +79,8 @@ class Proof:
             self.effect.reported(scene, self.target, x) for x in (self.values, *self.draws)
         )
         numbers = numbers_of(reported, drawn)
-        told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
-        sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
+        found = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
+        sentence = f"{found}; this is {100 * self.share:.0f} % of {whose} squared residual"
         more: dict[str, Any] = {"scope": scope_of(self.effect)}
         if gain is not None and gain.is_real():
             more["gain"] = gain.interval()
@@ -127,10 +127,10 @@ def _manner(
         return at_once
     start, end = ramp_of(times_s, own)
     left = []
-    for course in (times_s >= slip.start_s, ramp(times_s, start, end)):
-        columns = np.column_stack([np.ones(len(own)), course])
+    for shape in (times_s >= slip.start_s, ramp(times_s, start, end)):
+        columns = np.column_stack([np.ones(len(own)), shape])
         left.append(own - columns @ np.linalg.lstsq(columns, own, rcond=None)[0])
-    samples = sum(effective_samples(course) for course in left[1].T)
+    samples = sum(effective_samples(one) for one in left[1].T)
     gain = np.log((left[0] ** 2).sum() / (left[1] ** 2).sum())
     if 0.5 * samples * gain - 0.5 * np.log(samples) < logit(named_from):
         return at_once
@@ -173,8 +173,8 @@ def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding
 def bend_of(
     scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
-    """A second bend of the trunk or soft tissue that moves with it, which markers do not tell
-    apart, where that is much of their residuals given slips; nothing where it is little."""
+    """A second bend of the trunk or soft tissue that moves with it, which markers do not
+    distinguish, where that is much of their residuals given slips; nothing where it is little."""
     fewer = every(scene, ENOUGH_HZ)
     left = fewer.residual_m
     if left is None:
@@ -191,13 +191,13 @@ def bend_of(
     if waist.share >= bend.share:
         return ()  # by so much scaling errs
     alike = f"a second bend and soft tissue look alike here: to distinguish them, {effect.remedy}"
-    told = bend.finding(fewer, trial, None)
-    told = replace(
-        told,
+    found = bend.finding(fewer, trial, None)
+    found = replace(
+        found,
         verdict="ambiguous",
         class_id=class_id,
-        sentence=f"{told.sentence}; {alike}",
-        probability=told.probability / 2,  # nothing speaks for the one rather than the other
+        sentence=f"{found.sentence}; {alike}",
+        probability=found.probability / 2,  # nothing speaks for the one rather than the other
     )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
@@ -206,7 +206,7 @@ def bend_of(
         f"are {1000 * size:.0f} mm off; {alike}"
     )
     numbers = (Number("size", "m", size),)
-    return told, replace(told, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
+    return found, replace(found, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
@@ -214,8 +214,8 @@ def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
     m = scene.person.markers.index(one.target)
     own, change = residual_m[:, m : m + 1], one.left(scene)[:, m : m + 1]
     rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
-    columns, course, _ = rows
-    return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
+    columns, observed, _ = rows
+    return 1 - float(((observed - columns[:, 0]) ** 2).sum() / (observed @ observed))
 
 
 def _sized(
@@ -228,8 +228,8 @@ def _sized(
 ) -> Proof:
     """The effect's free parameters from the markers' residuals (N, m, 3), scanned ones given.
 
-    What lasts throughout shows in the means of the residuals alone, which are as sure as the
-    markers' places in the model. Stretches of BLOCK_S are taken for independent: so much noise is
+    What is there throughout shows in the means of the residuals alone, which are as sure as the
+    markers' places in the model. Intervals of BLOCK_S are taken for independent: so much noise is
     laid on each frame that all frames together say no more, and the sizes have their typical
     spread before the data.
     """
@@ -239,21 +239,21 @@ def _sized(
     shapes = [
         _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
     ]
-    told = np.stack(shapes, axis=-1) * effect.is_told(scene, target)
-    lasts = bool(scanned) and _is_throughout(scene, scanned[0])
-    columns, course, block = _in_rows(scene, told, residual_m, with_means=lasts)
+    shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
+    throughout = bool(scanned) and _is_throughout(scene, scanned[0])
+    columns, observed, block = _in_rows(scene, shown, residual_m, with_means=throughout)
     mine = [block == number for number in np.unique(block)]
     grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
-    rights = np.stack([columns[rows].T @ course[rows] for rows in mine])
+    rights = np.stack([columns[rows].T @ observed[rows] for rows in mine])
     gram, right = grams.sum(axis=0), rights.sum(axis=0)
     least = np.linalg.lstsq(gram, right, rcond=None)[0]
-    noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
+    noise = float(((observed - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
     prior = noise * np.eye(len(typical))
     size = np.linalg.solve(gram + prior, right)
-    left = course - columns @ size
+    left = observed - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
-    misplaced = _misplaced(told, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
+    misplaced = _misplaced(shown, residual_m, rng) if throughout else np.zeros((DRAWS, len(size)))
     drawn = [
         candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
         for one in _bootstrap(grams, rights, prior, misplaced, rng)
@@ -263,7 +263,7 @@ def _sized(
         if parameter.scan:  # known as well as it can be
             draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
     values = candidate.values(scene, typical * size)
-    share = 1 - float(left @ left) / float(course @ course)
+    share = 1 - float(left @ left) / float(observed @ observed)
     p_value = float(chi2.sf(size @ gram @ size / noise, len(size)))
     return Proof(effect, target, values, draws, share, p_value)
 
@@ -279,21 +279,21 @@ def _is_throughout(scene: Scene, from_s: float) -> bool:
     return from_s < scene.times_s[0]
 
 
-def _misplaced(told: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(DRAWS, k) what markers that sit elsewhere than the model has them, as far as these usually
+def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(DRAWS, k) what markers misplaced in the model, as far as these usually
     do, add to the right-hand side of shapes (N, m, 3, k)."""
     seen = np.isfinite(residual_m).all(axis=2).any(axis=0)
     places = np.nanmean(residual_m[:, seen], axis=0)
     usual = np.median(np.linalg.norm(places, axis=1)) / MEDIAN_LENGTH
-    known = np.isfinite(residual_m)[..., None] & np.isfinite(told)
-    total = np.where(known, told, 0.0).sum(axis=0).reshape(-1, told.shape[-1])
+    known = np.isfinite(residual_m)[..., None] & np.isfinite(shown)
+    total = np.where(known, shown, 0.0).sum(axis=0).reshape(-1, shown.shape[-1])
     return usual * rng.standard_normal((DRAWS, len(total))) @ total
 
 
 def _in_rows(
     scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray, with_means: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shapes (r, k), residual (r,) and number of the stretch (r,) where both are known, without
+    """Shapes (r, k), residual (r,) and number of the interval (r,) where both are known, without
     the mean of each marker and direction or with it."""
     known = np.isfinite(residual_m).all(axis=2) & np.isfinite(shapes_m).all(axis=(2, 3))
     block = ((scene.times_s - scene.times_s[0]) / BLOCK_S).astype(int)
@@ -302,8 +302,8 @@ def _in_rows(
     if not with_means:
         counts = np.maximum(weight.sum(axis=0), 1)
         both = [x - np.where(weight, x, 0.0).sum(axis=0) / counts for x in both]
-    columns, course = (x[known] for x in both)
-    return columns.reshape(-1, shapes_m.shape[-1]), course.ravel(), blocks
+    columns, observed = (x[known] for x in both)
+    return columns.reshape(-1, shapes_m.shape[-1]), observed.ravel(), blocks
 
 
 def _bootstrap(
@@ -313,13 +313,13 @@ def _bootstrap(
     misplaced: np.ndarray,
     rng: np.random.Generator,
 ) -> list[np.ndarray]:
-    """DRAWS of the sizes (k,), stretches drawn with replacement, ``misplaced`` (DRAWS, k) added to
-    the right-hand side; what the markers hardly tell is drawn nearer to zero, by the prior, than
+    """DRAWS of the sizes (k,), intervals drawn with replacement, ``misplaced`` (DRAWS, k) added to
+    the right-hand side; what the markers hardly show is drawn nearer to zero, by the prior, than
     it may be, and scatters by as much."""
-    count, told = len(grams), grams.sum(axis=0) + prior
+    count, total = len(grams), grams.sum(axis=0) + prior
     drawn = rng.integers(count, size=(DRAWS, count))
-    untold = prior @ np.linalg.solve(told, rng.standard_normal((len(prior), DRAWS)))
+    undetermined = prior @ np.linalg.solve(total, rng.standard_normal((len(prior), DRAWS)))
     return [
-        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + apart
-        for one, more, apart in zip(drawn, misplaced, untold.T, strict=True)
+        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + rest
+        for one, more, rest in zip(drawn, misplaced, undetermined.T, strict=True)
     ]

@@ -17,7 +17,7 @@ from bsip_cli.dynamics.regressor import move_moments
 from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect, Parameter, Reported
 from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 from bsip_cli.segments import in_words
 
 UNEXPLAINED = "unexplained"
@@ -29,12 +29,12 @@ class Nameless(Effect):
     """An error of unknown cause."""
 
     name = UNEXPLAINED
-    of_the_lab = True
+    is_of_laboratory = True
     remedy = "look at plates, cables and everything that touches the person, and record again"
 
 
 class Pattern(Nameless):
-    """A course that the residual may follow, linear in its size."""
+    """A signal that the residual may follow, linear in its size."""
 
     @abstractmethod
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
@@ -47,17 +47,17 @@ class Pattern(Nameless):
 # --- one of the six components --------------------------------------------------------------------
 
 
-def in_channel(scene: Scene, channel: str, course: np.ndarray) -> np.ndarray:
-    """(N, 6) a course (N,) in one component of the whole wrench, about where the person stands."""
-    wrench = np.zeros((len(course), 6))
-    wrench[:, CHANNELS.index(channel)] = course
-    return move_moments(wrench, -standing_place_m(scene))
+def in_channel(scene: Scene, channel: str, signal: np.ndarray) -> np.ndarray:
+    """(N, 6) a signal (N,) in one component of the whole wrench, about where the person stands."""
+    wrench = np.zeros((len(signal), 6))
+    wrench[:, CHANNELS.index(channel)] = signal
+    return move_moments(wrench, -place_of_stance_m(scene))
 
 
-def course_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
+def signal_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
     """(N,) one component of a world wrench (N, 6) about the origin, moments about where the person
     stands."""
-    return move_moments(wrench, standing_place_m(scene))[:, CHANNELS.index(channel)]
+    return move_moments(wrench, place_of_stance_m(scene))[:, CHANNELS.index(channel)]
 
 
 class Component(Pattern):
@@ -74,11 +74,11 @@ class Component(Pattern):
         return self.numbers or (Parameter(self.number, unit, -1e3, 1e3, self.usual[unit]),)
 
     @abstractmethod
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N,) what the component gains."""
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return in_channel(scene, target, self.course(scene, target, values))
+        return in_channel(scene, target, self.signal(scene, target, values))
 
 
 class Tone(Component):
@@ -106,11 +106,11 @@ class Tone(Component):
 
         In a long trial a swing at one frequency would fall between the regular ones.
         """
-        residual = course_of(scene, scene.measured - scene.predicted, channel)
-        course = np.where(scene.valid, np.nan_to_num(residual), 0.0)
-        course = np.where(scene.valid, course - course[scene.valid].mean(), 0.0)
-        count = 2 * len(course)
-        power = np.abs(np.fft.rfft(course * np.hanning(len(course)), count)) ** 2
+        residual = signal_of(scene, scene.measured - scene.predicted, channel)
+        signal = np.where(scene.valid, np.nan_to_num(residual), 0.0)
+        signal = np.where(scene.valid, signal - signal[scene.valid].mean(), 0.0)
+        count = 2 * len(signal)
+        power = np.abs(np.fft.rfft(signal * np.hanning(len(signal)), count)) ** 2
         hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
         around = 2 * round(self.AROUND_HZ * count / scene.rate_hz) + 1
         height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
@@ -118,7 +118,7 @@ class Tone(Component):
         lines = hertz[peaks[np.argsort(-found["peak_heights"])][: self.MOST_LINES]]
         return lines[(lines > slowest) & (lines < fastest)]
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
         return values[0] * np.cos(phase) + values[1] * np.sin(phase)
 
@@ -141,7 +141,7 @@ class Curve(Component):
 
     number = "curvature"
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return values[0] * _load(scene) ** 2
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
@@ -156,7 +156,7 @@ class Bend(Curve):
 
     MUCH = 1.2  # times the body weight: in squats
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         load = _load(scene)
         return values[0] * load * (load - 1)
 
@@ -184,7 +184,7 @@ class Ceiling(Component):
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return ("fz",) if self._beyond(scene).any() else ()
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return -values[0] * self._beyond(scene)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
@@ -227,9 +227,9 @@ class Play(Component):
     def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return values[1:] / 2
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        course = course_of(scene, scene.predicted, target)
-        behind = with_play(course, float(values[1])) - course
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        signal = signal_of(scene, scene.predicted, target)
+        behind = with_play(signal, float(values[1])) - signal
         return values[0] * behind / (0.5 * values[1])
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
@@ -243,10 +243,10 @@ class Play(Component):
         return (("error", unit_of(target), float(abs(values[0]))),)
 
 
-def with_play(course: np.ndarray, width: float) -> np.ndarray:
-    """(N,) what shows a course (N,) through a play of this full width, from its middle."""
-    shown, at = np.empty_like(course), course[0]
-    for k, value in enumerate(course):
+def with_play(signal: np.ndarray, width: float) -> np.ndarray:
+    """(N,) what shows a signal (N,) through a play of this full width, from its middle."""
+    shown, at = np.empty_like(signal), signal[0]
+    for k, value in enumerate(signal):
         at = min(max(at, value - 0.5 * width), value + 0.5 * width)
         shown[k] = at
     return shown
@@ -257,9 +257,9 @@ class Lag(Component):
 
     numbers = (Parameter("delay", "s", -0.5, 0.5, 0.02),)
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        course = course_of(scene, scene.predicted, target)
-        return -values[0] * np.gradient(course) * scene.rate_hz
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        signal = signal_of(scene, scene.predicted, target)
+        return -values[0] * np.gradient(signal) * scene.rate_hz
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         order = "late" if values[0] > 0 else "early"
@@ -276,8 +276,8 @@ class Warming(Component):
 
     numbers = (Parameter("change_of_gain", "1", -1.0, 1.0, 0.04),)
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return values[0] * (_through(scene) - 0.5) * course_of(scene, scene.predicted, target)
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return values[0] * (_through(scene) - 0.5) * signal_of(scene, scene.predicted, target)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         size = 100 * values[0]
@@ -285,11 +285,11 @@ class Warming(Component):
 
 
 class Bow(Component):
-    """A component whose zero goes away and comes back in the course of the trial."""
+    """A component whose zero goes away and comes back during the trial."""
 
     number, usual = "bow", _SMALL
 
-    def course(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         through = _through(scene)
         return values[0] * 4 * through * (1 - through)
 
@@ -407,7 +407,7 @@ class Band(Pattern):
 class ClockJump(Delay, Pattern):
     """From a moment on the forces come later than before: frames or samples were lost."""
 
-    of_the_lab = False  # the moment is another one in every trial
+    is_of_laboratory = False  # the moment is another one in every trial
     LEAST_S = 1.0
     UNSEEN_S = 0.1  # as good as nothing
     APART_S, MOST = 0.5, 40

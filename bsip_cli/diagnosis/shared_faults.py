@@ -4,7 +4,7 @@ The plates, the clock and the vertical belong to a laboratory, body and skin to 
 person's equations only those of the shared faults are kept: of the white normal equations
 [G_oo G_os; G_so G_ss] x = [a_o; a_s] what is left when the own coefficients, of covariance R, are
 integrated out, G_ss - G_so (G_oo + R^-1)^-1 G_os and the like. These sum over persons. What trials
-tell in which a person stands still to be calibrated is kept apart from what motion tells: a plate
+show in which a person stands still to be calibrated is separate from what motion shows: a plate
 that moved between them is no contradiction.
 """
 
@@ -32,7 +32,7 @@ STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(
     effect
     for effect in CATALOGUE
-    if effect.of_the_lab and (is_of_instruments(effect) or isinstance(effect, Turned))
+    if effect.is_of_laboratory and (is_of_instruments(effect) or isinstance(effect, Turned))
 )
 _MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
 _ASKED = (*OF_A_LABORATORY, STATED_MASS)
@@ -42,7 +42,7 @@ _ASKED = (*OF_A_LABORATORY, STATED_MASS)
 class Coordinate:
     """One number of a fault at a plate, or a channel of it; the clock has no target.
 
-    standing : as trials tell it in which a person stands still; else all others, or both alike.
+    standing : as quiet stance shows it; else all others, or both alike.
     """
 
     effect: str
@@ -54,7 +54,7 @@ class Coordinate:
 @dataclass(frozen=True, eq=False)
 class Information:
     """Of C coordinates [typical sizes]: precision (C, C) and pull (C,), so that the likeliest
-    sizes of this person alone solve precision @ sizes = pull. trials (C,) : how many tell of it."""
+    sizes of this person alone solve precision @ sizes = pull. trials (C,) : how many show it."""
 
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
@@ -65,7 +65,7 @@ class Information:
 
 @dataclass(frozen=True, eq=False)
 class SharedTrial(FaultTrial):
-    """A trial whose forces all are as simulated: near the ends of what is valid the measured course
+    """A trial whose forces all are as simulated: near the ends of what is valid the measured signal
     bends as feet come and go beside the plates, and its slope would be taken for a delay."""
 
     standing: bool
@@ -77,7 +77,7 @@ class SharedTrial(FaultTrial):
 
 def shared_targets(effect: Effect, scene: Scene) -> list[str]:
     """Where a trial has a fault that all have."""
-    return [one for one in effect.targets(scene) if effect.is_shared(scene, one)]
+    return [one for one in effect.targets(scene) if effect.is_shared_at(scene, one)]
 
 
 def inner(scene: Scene) -> Scene:
@@ -136,8 +136,8 @@ def with_known(
 
 
 def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothesis]:
-    """Every shared fault at every plate, apart in motion and not; all plates alike are these
-    together."""
+    """Every shared fault at every plate, in motion and in quiet stance separately; all plates
+    alike are these together."""
     found = []
     for effect in _ASKED:
         targets = [shared_targets(effect, one.scene) for one in trials]
@@ -146,8 +146,10 @@ def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothes
                 continue
             holding = tuple(t for t, mine in enumerate(targets) if target in mine)
             count = len(effect.parameters(trials[holding[0]].scene, target))
-            apart = [tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)]
-            for mine in [holding] if effect is STATED_MASS else filter(None, apart):
+            separate = [
+                tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)
+            ]
+            for mine in [holding] if effect is STATED_MASS else filter(None, separate):
                 found.append(Hypothesis(effect, target, mine, np.zeros(count)))
     return found
 

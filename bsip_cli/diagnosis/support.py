@@ -113,8 +113,8 @@ def held_by(
     trunk = _moves_m(trunk_m)
     moves = {name: _moves_m(path) for name, path in hands_m.items()}
     still = tuple(h for h, x in moves.items() if x < STILL_M and STILLER * x < trunk)
-    counts = np.array([effective_samples(course) for course in missing_N.T])
-    error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated courses
+    counts = np.array([effective_samples(signal) for signal in missing_N.T])
+    error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated signals
     force = missing_N.mean(axis=0)
     if not still or not _is_unbalanced(force, error, weight_N):
         return None
@@ -163,12 +163,12 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
 
 # --- do the plates carry the person whose mass is stated? -----------------------------------------
 
-# The wrench alone cannot tell: free parameters follow the plates. Nothing in a quiet trial tells
-# why the plates read another mass, and nothing in moving ones where the inertial parameters follow
-# the plates or several plates carry the person. So this is a class of causes, of which every one is
-# printed with its own size.
+# The wrench alone does not show it: free parameters follow the plates. Nothing in a quiet trial
+# shows why the plates read another mass, and nothing in moving ones where the inertial
+# parameters follow the plates or several plates carry the person. So this is a class of causes,
+# of which every one is printed with its own size.
 
-NOTICED = 0.02  # part of the mass from which on it is told, if a scale errs less
+NOTICED = 0.02  # part of the mass from which on it is reported, if a scale errs less
 SURE_OF_SCALE = 2.5  # standard deviations of a stated mass beyond which it is
 LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 CLASS = "W"  # of the weight; those found in the motion are A, B, C
@@ -179,8 +179,8 @@ REMEDY = (
 
 def weight_share(scene: Scene) -> float:
     """Mean vertical force beyond the simulated one, part of body weight."""
-    apart = (scene.measured - scene.predicted)[scene.valid, 2]
-    return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
+    missing = (scene.measured - scene.predicted)[scene.valid, 2]
+    return float(missing.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
 def is_noticed(share: float, mass_sd: float) -> bool:
@@ -194,9 +194,9 @@ def is_noticed(share: float, mass_sd: float) -> bool:
 def agreed_share(scenes: Sequence[Scene], mass_sd: float) -> float | None:
     """What moving trials say of the stated mass, like ``weight_share``; nothing if plates and scale
     agree, or the trials do not agree with each other."""
-    apart = np.array([weight_share(one) for one in scenes])
-    share = float(np.median(apart))
-    agree = np.abs(apart - share).max() <= 0.5 * abs(share)
+    shares = np.array([weight_share(one) for one in scenes])
+    share = float(np.median(shares))
+    agree = np.abs(shares - share).max() <= 0.5 * abs(share)
     return share if agree and is_noticed(share, mass_sd) else None
 
 
@@ -230,7 +230,7 @@ def stated_mass_findings(
         return ()
     p_value = float(2 * norm.sf(abs(share) / mass_sd))  # how likely a scale errs by that much
     error, extra = mass_sd * mass_kg, share * mass_kg
-    told = (
+    found = (
         f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
         f"{'more' if extra > 0 else 'less'} than stated"
     )
@@ -251,7 +251,7 @@ def stated_mass_findings(
             target,
             trials,
             (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
-            f"{told}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
+            f"{found}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
             p_value,
             (1 - p_value) / (len(causes) + 1),
             "ambiguous",

@@ -8,7 +8,7 @@ from scipy import sparse
 _REACH = 4.0  # standard deviations at which the kernel ends
 
 
-def stretches(valid: np.ndarray) -> list[tuple[int, int]]:
+def valid_intervals(valid: np.ndarray) -> list[tuple[int, int]]:
     """Half-open index ranges of the runs of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], valid.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
@@ -50,9 +50,9 @@ def lowpass_operator(
 
 
 def _outputs(valid: np.ndarray, stride: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n_out,) start and stop of each output's stretch, and its frame."""
+    """(n_out,) start and stop of each output's interval, and its frame."""
     parts = [np.empty((0, 3), dtype=int)]
-    for start, stop in stretches(valid):
+    for start, stop in valid_intervals(valid):
         frames = np.arange(start + min(stride, stop - start) // 2, stop, stride)
         parts.append(np.stack([np.full_like(frames, start), np.full_like(frames, stop), frames], 1))
     starts, stops, frames = np.concatenate(parts).T

@@ -29,7 +29,7 @@ class WrenchResponse:
     rate_hz: float
 
     def of(self, errors: np.ndarray) -> np.ndarray:
-        """(N, 6, k) change of the wrench for courses of pose errors (N, nv, k)."""
+        """(N, 6, k) change of the wrench for signals of pose errors (N, nv, k)."""
         speed = self._rate_of(errors)
         acceleration = np.gradient(speed, 1 / self.rate_hz, axis=0)
         return (
@@ -41,7 +41,7 @@ class WrenchResponse:
     def parts(self, errors: np.ndarray) -> np.ndarray:
         """(3, N, 6, k) what s, s' and s'' add to the wrench, for pose errors s(t) d(t).
 
-        ``errors`` (N, nv, k) are d; so one course serves every s.
+        ``errors`` (N, nv, k) are d; so one signal serves every s.
         """
         speed = self._rate_of(errors)
         both = np.gradient(errors, 1 / self.rate_hz, axis=0) + speed
@@ -49,7 +49,7 @@ class WrenchResponse:
         return np.stack([self.of(errors), with_rate, self.to_acceleration @ errors])
 
     def _rate_of(self, errors: np.ndarray) -> np.ndarray:
-        """Error of v for a course of pose errors: d' + v x d where axes turn with the body."""
+        """Error of v for a signal of pose errors: d' + v x d where axes turn with the body."""
         speed = np.gradient(errors, 1 / self.rate_hz, axis=0)
         for at in self.spherical:
             turning = slice(at, at + 3)

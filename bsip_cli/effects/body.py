@@ -24,7 +24,7 @@ class StatedMass(Effect):
     gain of all plates."""
 
     name = "stated_mass"
-    of_the_person = True
+    is_of_person = True
     remedy = "weigh the person as recorded"
     parameter = Parameter("share", "1", -0.5, 1.0, 0.01)  # scales, clothes and a week make as much
     numbers = (parameter,)
@@ -45,7 +45,7 @@ class SegmentInertia(Effect):
     """A segment whose mass, centre of mass and inertia are not those of the table."""
 
     name = "segment_inertia"
-    of_the_person = True
+    is_of_person = True
     of_the_body = True
     looks = (
         "forces that go with the acceleration of one segment in every trial, beyond what "
@@ -144,7 +144,7 @@ IMPACT, IMPACT_S = 0.8, 0.05
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
 # Soft tissue is no point on one spring: its numbers are known to these standard deviations. Beneath
-# the markers of a limb the skin slides, and the mass that swings there is told too low.
+# the markers of a limb the skin slides, and the mass that swings there is found too low.
 MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 
@@ -160,7 +160,7 @@ class WobblingMass(Effect):
 
     name = "wobbling_mass"
     on_its_segment = True
-    of_the_person = True
+    is_of_person = True
     looks = (
         "after impacts the measured force swings on at 2 to 8 Hz and dies away, which "
         "the simulated one does not"
@@ -239,7 +239,7 @@ SLOWEST_HZ, FASTEST_HZ = 0.12, 0.6
 # The breastbone moves ahead and up; torso axes.
 OUTWARD = np.array([0.8, 0.6, 0.0])
 LEAST_BREATHS = 3
-# A quarter of it is not told: as much is where the markers of the chest breathe and no mass does.
+# A quarter of it is no finding: so much is where the markers of the chest breathe and no mass does.
 TYPICAL_KG_M = 0.3
 PACE_HZ = 3e-4  # to which a pace is known: nobody breathes like a clock
 

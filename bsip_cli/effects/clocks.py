@@ -20,14 +20,14 @@ MOST_DRIFT = 0.003
 class Delay(Effect):
     """The forces come late against the markers."""
 
-    of_the_lab = True
+    is_of_laboratory = True
 
     @abstractmethod
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         """(N,) how late the forces of each frame were recorded [s]."""
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return put_right(scene, self.late_s(scene, values))
+        return corrected(scene, self.late_s(scene, values))
 
 
 class SyncOffset(Delay):
@@ -68,13 +68,13 @@ class ClockDrift(Delay):
         return f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"
 
 
-def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
+def corrected(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     """(N, 6) the measured wrench less the same corrected by (N,) seconds; the trial's ends stay.
 
-    From the measured course: the simulated one holds the noise of the motion, whose derivative
+    From the measured signal: the simulated one holds the noise of the motion, whose derivative
     would make every delay seem smaller than it is.
     """
-    return scene.measured - scene.measured_course(right_times_s(scene, late_s))
+    return scene.measured - scene.measured_signal(right_times_s(scene, late_s))
 
 
 def right_times_s(scene: Scene, late_s: np.ndarray) -> np.ndarray:
@@ -100,7 +100,7 @@ def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
         return of_the_plates + others
     if of_the_plates.any():
         of_the_plates = CubicSpline(scene.times_s, of_the_plates)(right_times_s(scene, late_s))
-    return of_the_plates + others + put_right(scene, late_s)
+    return of_the_plates + others + corrected(scene, late_s)
 
 
 def joint_delay_s(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:

@@ -51,26 +51,26 @@ class Effect(ABC):
 
     name: ClassVar[str]
     numbers: ClassVar[tuple[Parameter, ...]] = ()  # its parameters, the same in every trial
-    of_the_lab: ClassVar[bool] = False  # the same in every trial of a recording session
-    of_the_person: ClassVar[bool] = False  # the same in every trial of a person
+    is_of_laboratory: ClassVar[bool] = False  # the same in every trial of a recording session
+    is_of_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
     looks: ClassVar[str]  # what a person sees of it in the curves
-    remedy: ClassVar[str]  # what would separate it from its rivals
-    least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not told
+    remedy: ClassVar[str]  # what would separate it from others of its ambiguity group
+    least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not reported
 
     @property
-    def lasts(self) -> bool:
+    def is_shared(self) -> bool:
         """Whether trials can share it, with the same numbers."""
-        return self.of_the_lab or self.of_the_person
+        return self.is_of_laboratory or self.is_of_person
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""
         return ("",)
 
-    def is_shared(self, scene: Scene, target: str) -> bool:
+    def is_shared_at(self, scene: Scene, target: str) -> bool:
         """Whether a trial has it at a target if the others have."""
         return True
 
@@ -110,7 +110,7 @@ class Effect(ABC):
         """(K,) True for the parameters without a scan."""
         return np.array([not p.scan for p in self.parameters(scene, target)])
 
-    def is_told(self, scene: Scene, target: str) -> np.ndarray:
+    def is_identifiable(self, scene: Scene, target: str) -> np.ndarray:
         """(k,) True for the parameters without a scan of which the motion can decide anything."""
         return np.ones(int(self.is_free(scene, target).sum()), dtype=bool)
 

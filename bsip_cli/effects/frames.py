@@ -15,7 +15,7 @@ class Turned(Effect):
     """Something of the lab is turned against the rest by the angles about x and y (rotation
     vector)."""
 
-    of_the_lab = True
+    is_of_laboratory = True
     numbers = tuple(Parameter(f"angle_{axis}", "rad", -0.2, 0.2, 0.01) for axis in "xy")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:

@@ -1,4 +1,4 @@
-"""Joints that lie elsewhere than the model has them, and one that it lacks."""
+"""Joints that are misplaced in the model, and one that it lacks."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class JointCentre(Effect):
 
     In the static trial the limb lies where its markers are, whichever centre the model has. When
     the joint turns, true and modelled limb come apart by (R_parent - R_child) shift: the limb's
-    masses are elsewhere, and its markers drag the pose along. A residual that stays the same may
-    be lost where scaling has moved the markers.
+    masses are in other places, and its markers drag the pose along. A residual that stays the
+    same may be lost where scaling has moved the markers.
     """
 
     name = "joint_centre"
-    of_the_person = True
+    is_of_person = True
     of_the_body = True
     numbers = along_xyz("shift", "m", -MOST_M, MOST_M, 0.015)
     looks = (
@@ -138,7 +138,7 @@ class MissingJoint(Effect):
     """
 
     name = "missing_joint"
-    of_the_person = True
+    is_of_person = True
     numbers = tuple(Parameter(axis, "1", -0.5, 1.5, 0.3, known_to=SHARE) for axis in AXES)
     looks = "markers of the trunk that fit badly when it bends, and moments that go with the bend"
     remedy = "put markers on both sides of T12/L1 and bend the trunk"
@@ -171,19 +171,19 @@ class MissingJoint(Effect):
         ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
 
-    def is_told(self, scene: Scene, target: str) -> np.ndarray:
+    def is_identifiable(self, scene: Scene, target: str) -> np.ndarray:
         """A movement that is hardly made says nothing of its part."""
         made = np.ptp(_turn(scene, scene.person.skeleton.index(target)), axis=0) > LITTLE_RAD
         return made[list(AXES.values())]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        asked = np.where(self.is_told(scene, target), values, 0.0)
+        asked = np.where(self.is_identifiable(scene, target), values, 0.0)
         return super().possible(scene, target, asked)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         shares = dict(zip(AXES, values.tolist(), strict=True))
-        told = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
-        parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in told.items())
+        large = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
+        parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in large.items())
         return f"the trunk moves at a second joint between waist and neck ({parts})"
 
     @staticmethod

@@ -223,7 +223,7 @@ class Implement(Effect):
     """
 
     name = "implement"
-    of_the_person = True
+    is_of_person = True
     while_moving = True
     on_its_segment = True
     looks = "moments that go with the swing of the hands, far larger than their forces"
@@ -355,7 +355,7 @@ class ExternalForce(Effect):
     """
 
     name = "external_force"
-    of_the_person = True
+    is_of_person = True
     while_moving = True
     on_its_segment = True
     numbers = along_xyz("force", "N", -800.0, 800.0, 40.0)
@@ -468,7 +468,7 @@ class UnmeasuredContact(Effect):
         return np.column_stack([forces, (starts + ends) / 2, lengths])
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """A touch that lasts: at the edge of what is measured a step onto the plate looks alike."""
+        """A touch that stays: at the edge of what is measured a step onto the plate looks alike."""
         touching = np.abs(scene.times_s - values[3]) <= values[4] / 2
         seconds = float((touching & scene.valid).sum()) / scene.rate_hz
         return super().possible(scene, target, values) and seconds >= SHORTEST_S

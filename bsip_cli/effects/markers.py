@@ -19,7 +19,7 @@ RISE_S = 0.04  # standard deviation of the ramp that smoothing leaves of a sudde
 APART_S = 0.5
 BEFORE_S = 1.0
 SKIN_M, MOMENT_S = 0.0015, 0.03  # to which place and moment are known: skin gives way
-ASTRAY_M = 0.006  # a residual that lasts, or changes its level, by this much
+ASTRAY_M = 0.006  # a residual that stays, or changes its level, by this much
 OWN_SHARE = 0.3  # of the marker's own squared residual that a shift must take away
 SHIFT = tuple(Parameter(axis, "m", -0.15, 0.15, 0.02, known_to=SKIN_M) for axis in "xyz")
 ABSORBED = Parameter("absorbed", "1", 0.0, 1.0, 0.25, (0.0, 0.5))
@@ -32,9 +32,9 @@ def step(times_s: np.ndarray, at_s: float, rise_s: float = RISE_S) -> np.ndarray
     return np.stack([ndtr(x), slope, -x * slope / rise_s])
 
 
-def during(course: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """(N, 6, k) change of the wrench for a course s, s', s'' (3, N)."""
-    return np.einsum("dn,dnck->nck", course, parts)
+def during(signal: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """(N, 6, k) change of the wrench for a signal s, s', s'' (3, N)."""
+    return np.einsum("dn,dnck->nck", signal, parts)
 
 
 class MarkerShift(Effect):
@@ -89,17 +89,17 @@ class MarkerShift(Effect):
             return -scene.response.parts(scene.pose_response.of(self._directions(scene, m), [m]))
 
         parts = scene.once(("of a marker", m), lacking)
-        return during(self.course(scene, values), parts) @ values[:3]
+        return during(self.signal(scene, values), parts) @ values[:3]
 
-    def course(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         """(3, N) the part of the shift by which the marker is off, and its derivatives."""
-        course = step(scene.times_s, values[3])
-        course[0] -= values[4]
-        return course
+        signal = step(scene.times_s, values[3])
+        signal[0] -= values[4]
+        return signal
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         m = scene.person.markers.index(target)
-        slipped = self.course(scene, values)[0][:, None]
+        slipped = self.signal(scene, values)[0][:, None]
         errors = slipped * (self._directions(scene, m)[:, 0] @ values[:3])
         return scene.pose_response.left(errors[:, None, :, None], [m])[..., 0]
 
@@ -121,7 +121,7 @@ class MarkerShift(Effect):
 
 
 def _off_their_places(scene: Scene, residual_m: np.ndarray) -> tuple[str, ...]:
-    """Markers whose residual lasts, or changes its level, by ASTRAY_M."""
+    """Markers whose residual stays, or changes its level, by ASTRAY_M."""
     found = []
     for m, name in enumerate(scene.person.markers):
         own = residual_m[:, m]
@@ -179,11 +179,11 @@ class MarkerSlide(MarkerShift):
             ABSORBED,
         )
 
-    def course(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+    def signal(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         """A ramp with round ends, of the same spread in time as an even one."""
-        course = step(scene.times_s, values[3], SPREAD * values[4])
-        course[0] -= values[5]
-        return course
+        signal = step(scene.times_s, values[3], SPREAD * values[4])
+        signal[0] -= values[5]
+        return signal
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The way's length and parts, and when it begins and ends."""
@@ -215,7 +215,7 @@ def ramp_of(times_s: np.ndarray, residual_m: np.ndarray) -> tuple[float, float]:
 
 
 def ramp(times_s: np.ndarray, start_s: float, end_s: float) -> np.ndarray:
-    """(N,) from 0 to 1, as of :meth:`MarkerSlide.course`."""
+    """(N,) from 0 to 1, as of :meth:`MarkerSlide.signal`."""
     return step(times_s, 0.5 * (start_s + end_s), SPREAD * (end_s - start_s))[0]
 
 
@@ -344,7 +344,7 @@ class OverSmoothing(Effect):
     """
 
     name = "over_smoothing"
-    of_the_lab = True
+    is_of_laboratory = True
     least_named = MappingProxyType({"share": 0.3})  # less belongs to another cut-off
     looks = "peaks of the simulated force too low and too wide, in fast movements only"
     remedy = "export the trial again without the lab's filter"

@@ -65,10 +65,10 @@ def plates_that(name: str, does: str, do: str) -> str:
     return f"{plates_called(name)} {do if name == ALL else does}"
 
 
-def in_channel(plate: Plate, channel: int, course: np.ndarray | float) -> np.ndarray:
-    """(N, 6) wrench about the world's origin of a course (N,) that one channel shows."""
+def in_channel(plate: Plate, channel: int, signal: np.ndarray | float) -> np.ndarray:
+    """(N, 6) wrench about the world's origin of a signal (N,) that one channel shows."""
     reading = np.zeros((len(plate.wrench), 6))
-    reading[:, channel] = course
+    reading[:, channel] = signal
     axes = plate.axes()
     force = reading[:, :3] @ axes
     return np.hstack([force, reading[:, 3:] @ axes + np.cross(plate.moments_about_m(), force)])
@@ -87,7 +87,7 @@ class OfPlates(Effect):
     ``channels`` : in which channels of it; none where it is the plate's as a whole.
     """
 
-    of_the_lab = True
+    is_of_laboratory = True
     of_the_plates = True
     channels: tuple[str, ...] = ()
 
@@ -97,22 +97,22 @@ class OfPlates(Effect):
         return tuple(f"{p} {c}".strip() for p in plates for c in self.channels or ("",))
 
 
-class OwnCourse(OfPlates):
-    """A channel of one plate shows a course too much, whatever it measures."""
+class OwnSignal(OfPlates):
+    """A channel of one plate shows a signal too much, whatever it measures."""
 
     channels = CHANNELS
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in self.channels)
 
-    def course(self, scene: Scene) -> np.ndarray:
+    def signal(self, scene: Scene) -> np.ndarray:
         """(N,) for a size of one."""
         return np.ones(len(scene.times_s))
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, channel = target.rsplit(" ", 1)
-        course = values[0] * self.course(scene)
-        return in_channel(plate_of(scene, name), CHANNELS.index(channel), course)
+        signal = values[0] * self.signal(scene)
+        return in_channel(plate_of(scene, name), CHANNELS.index(channel), signal)
 
     def _reads(self, target: str) -> tuple[str, str]:
         """Whose channel it is in words, and its unit."""
@@ -120,14 +120,14 @@ class OwnCourse(OfPlates):
         return f"plate {name} reads {OF_A_PLATE[channel]}", unit_of(channel)
 
 
-class PlateZero(OwnCourse):
+class PlateZero(OwnSignal):
     """A force plate's channel with a constant offset."""
 
     name = "plate_zero"
     looks = "a constant difference in one channel, with and without load"
     remedy = "step off the plate for five seconds"
 
-    def is_shared(self, scene: Scene, target: str) -> bool:
+    def is_shared_at(self, scene: Scene, target: str) -> bool:
         return not plate_of(scene, target.split(" ")[0]).zeroed
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
@@ -140,14 +140,14 @@ class PlateZero(OwnCourse):
         return f"{reads} with a constant offset of {values[0]:+.1f} {unit}"
 
 
-class PlateDrift(OwnCourse):
+class PlateDrift(OwnSignal):
     """A force plate's channel that drifts through the trial.
 
     Linear, zero where the trial begins.
     """
 
     name = "plate_drift"
-    of_the_lab = False
+    is_of_laboratory = False
     looks = "a difference in one channel that grows evenly with time"
     remedy = "step off the plate at the beginning and at the end"
 
@@ -156,7 +156,7 @@ class PlateDrift(OwnCourse):
         most, typical = (20.0, 15.0) if unit == "N" else (10.0, 7.0)
         return (Parameter("drift", f"{unit}/s", -most, most, typical / duration),)
 
-    def course(self, scene: Scene) -> np.ndarray:
+    def signal(self, scene: Scene) -> np.ndarray:
         return scene.times_s - scene.times_s[0]
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
@@ -171,7 +171,7 @@ class PlateGain(OfPlates):
     """
 
     name = "plate_gain"
-    # A quarter of 0.04 is not told: plates of one lab differ by some tenths of a percent.
+    # A quarter of 0.04 is not reported: plates of one lab differ by some tenths of a percent.
     numbers = (Parameter("gain", "1", -0.15, 0.15, 0.04),)
     channels = CHANNELS[:3]
     looks = (

@@ -145,11 +145,11 @@ class Scene:
         return np.nan_to_num(sum((plate.wrench for plate in self.plates), np.zeros((1, 6))))
 
     @cached_property
-    def measured_course(self) -> CubicSpline:
+    def measured_signal(self) -> CubicSpline:
         """The measured wrench between the frames too.
 
         Fourier's interpolation first: a spline through few samples is quieter between them than on
-        them, which would draw every delay away from whole frames. It takes the course for a period:
+        them, which would draw every delay away from whole frames. It takes the signal for a period:
         without the line from one end to the other, it would ring where they meet.
         """
         count = len(self.times_s)
@@ -284,6 +284,6 @@ def without_fast(wrench: np.ndarray, stride: int) -> np.ndarray:
     return np.where(np.isnan(wrench), np.nan, slow)
 
 
-def standing_place_m(scene: Scene) -> np.ndarray:
+def place_of_stance_m(scene: Scene) -> np.ndarray:
     """(3,) where the person stands on the ground: moments about it are small."""
     return np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)

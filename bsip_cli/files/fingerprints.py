@@ -43,7 +43,7 @@ class Fingerprint:
 class _Known:
     status: tuple[int, ...]
     found: Fingerprint
-    is_settled: bool
+    is_final: bool
 
 
 _known: dict[str, _Known] = {}
@@ -59,7 +59,7 @@ def fingerprint(path: Path) -> Fingerprint:
         before, now = _status(name), time.time_ns()
         known = _known.get(name)
         if known is None or known.status != before:
-            known = _known[name] = _Known(before, _taken(name), _is_settled(before, now))
+            known = _known[name] = _Known(before, _taken(name), _is_final(before, now))
     except OSError as error:
         _known.pop(name, None)
         raise BadDataError(
@@ -122,7 +122,7 @@ def to_keep(folders: Iterable[Path], note: str) -> str:
     kept = {
         name: [known.status, known.found.sha256, known.found.intact]
         for name, known in sorted(_known.items())
-        if known.is_settled and name.startswith(below) and os.path.lexists(name)
+        if known.is_final and name.startswith(below) and os.path.lexists(name)
     }
     return json.dumps({"note": note, "files": kept}, indent=0) + "\n"
 
@@ -142,7 +142,7 @@ def snapshot(folder: Path, files: Iterable[Path]) -> str:
             status = known.status if known else _status(str(path))
         except OSError:
             return ""
-        if not _is_settled(status, now):
+        if not _is_final(status, now):
             return ""
         digest.update(os.fsencode(path) + repr(status).encode())
     return digest.hexdigest()
@@ -163,7 +163,7 @@ def _status(name: str) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
-def _is_settled(status: tuple[int, ...], now: int) -> bool:
+def _is_final(status: tuple[int, ...], now: int) -> bool:
     step_s = _COARSE_STEP_S if status[-1] % _COARSE_NS == 0 else STEP_S
     return now - max(status[-2:]) > step_s * 1e9
 

@@ -76,7 +76,7 @@ def trial_stem(forces: Path) -> str:
 
 
 def forces_beside(trc: Path) -> Path | None:
-    """The file of ground forces beside a TRC, in small letters or capitals; None without one.
+    """The file of ground forces next to a TRC, in small letters or capitals; None without one.
 
     BadDataError: there are several, and which one is meant cannot be known.
     """
@@ -89,7 +89,7 @@ def forces_beside(trc: Path) -> Path | None:
     ]
     if len(found) > 1:
         raise BadDataError(
-            f"there are {' and '.join(printable(path.name) for path in found)} beside it",
+            f"there are {' and '.join(printable(path.name) for path in found)} next to it",
             file=trc,
             expected="one file of ground forces",
             remedy="leave the one with the forces there, and move the others elsewhere",

@@ -165,8 +165,8 @@ def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
 def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple]:
     """Scale (n,) and Cholesky factor of the matrix scaled to a unit diagonal.
 
-    Beside a segment that the data press flat, rounding may hide the rest: then a little is added to
-    the diagonal, which shortens the step and changes no optimum.
+    Next to a segment that the data press flat, rounding may hide the rest: then a little is added
+    to the diagonal, which shortens the step and changes no optimum.
     """
     scale = 1.0 / np.sqrt(np.diag(matrix))
     scaled = matrix * np.outer(scale, scale)
@@ -184,12 +184,12 @@ def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple]:
     )
 
 
-# --- how much each part of the prior counts beside the data, from the data themselves -------------
+# --- how much each part of the prior counts against the data, from the data themselves ------------
 
 # The weights are those of the largest marginal likelihood of the measured wrench, by Laplace's
 # approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): a spread is the
 # mean square of the deviations over the number of them that the data decided; the option
-# ``spread_weight`` says how many deviations as large as [prior] says count beside them, so that
+# ``spread_weight`` says how many deviations as large as [prior] says count against them, so that
 # little data leave [prior] as it is. Masses share one spread and centres of mass another, neither
 # wider than [prior] says; the tensors of a pair of limbs, or of a segment of the midline, have
 # their own, because a table may miss a single one by far (Dumas 2007's trunk). Where the plates are
@@ -202,7 +202,7 @@ _NEVER_WIDER = slice(0, 2)  # of the spreads: masses, centres
 # of that: it shapes what [prior] spreads, and little data must not make it a narrower prior.
 _GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0)
 _ROUNDS = 20
-_SETTLED = 0.02  # relative change of the weights
+_CONVERGED = 0.02  # relative change of the weights
 _LARGEST_CHANGE = 4.0  # per round
 
 
@@ -215,7 +215,7 @@ class Terms:
     strength, right : of the weighted wrench residual 1/2 x^T diag(strength) x - right^T x.
     spreads : precision of all masses, of all centres of mass, of each pair's tensors, and of the
     instruments; fixed : that of the total mass, which keeps its weight. phi = table + shown x, and
-    beside x (m,) is what the instruments do wrong.
+    what the instruments do wrong is instruments x, of x (m,).
     """
 
     strength: np.ndarray
@@ -223,7 +223,7 @@ class Terms:
     spreads: tuple[np.ndarray, ...]
     fixed: np.ndarray
     shown: np.ndarray
-    beside: np.ndarray
+    instruments: np.ndarray
     table: np.ndarray
     spread_weight: float
 
@@ -309,7 +309,7 @@ def fit_with_weights(terms: Terms) -> Fit:
         for _ in range(_ROUNDS):
             old, new = fit.weights.spread, _updated(terms, fit)
             fit = fit_at(terms, Weights(new, gamma), fit)
-            if np.abs(np.log(new / old)).max() < _SETTLED:
+            if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
         if best is None or fit.evidence > best.evidence:
             best, spread = fit, fit.weights.spread
@@ -328,7 +328,8 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     decided = np.trace(np.eye(len(root)) - np.linalg.solve(covariance, optimum.covariance))
     # Beforehand nothing ties the instruments to the body or to each other: their share comes off.
     kept, known = (
-        np.sum(terms.beside @ x * terms.beside, axis=1) for x in (optimum.covariance, covariance)
+        np.sum(terms.instruments @ x * terms.instruments, axis=1)
+        for x in (optimum.covariance, covariance)
     )
     decided = max(float(decided - (1 - kept / known).sum()), 0.0)
     return Fit(weights, optimum, float(0.5 * logs - optimum.value), covariance, decided)

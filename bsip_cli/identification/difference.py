@@ -75,7 +75,7 @@ def change_of_segments(a: Problem, b: Problem, segments: Sequence[int]) -> Segme
     seen = information_b[:, part]
     precision = information_b[np.ix_(part, part)] - seen.T @ common @ seen
     right = right_b[part] - seen.T @ common @ (right_a + right_b)
-    scale = 1 / np.sqrt(np.diag(precision))  # kg beside kg m2
+    scale = 1 / np.sqrt(np.diag(precision))  # kg and kg m2
     covariance = np.outer(scale, scale) * np.linalg.inv(np.outer(scale, scale) * precision)
     return SegmentChange(covariance @ right, covariance)
 
@@ -88,14 +88,14 @@ def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resolution R = 1 - C P^-1 (P, P), and the noise's covariance R C, along the directions in
-    which C is a part w of the prior; a w above 1 (C is linearised elsewhere) counts as 1.
+    which C is a part w of the prior; a w above 1 (C is linearised at another point) counts as 1.
 
     Of parameters that keep the table's values, which have no spread, nothing is resolved.
     """
     free = np.flatnonzero(np.diag(prior_covariance) > 0)
     among = np.ix_(free, free)
     prior, covariance = prior_covariance[among], estimate.covariance[among]
-    scale = np.sqrt(np.diag(prior))  # kg beside kg m2
+    scale = np.sqrt(np.diag(prior))  # kg and kg m2
     root = np.linalg.cholesky(prior / np.outer(scale, scale)) * scale[:, None]
     inverse = np.linalg.inv(root / scale[:, None]) / scale
     part, directions = np.linalg.eigh(inverse @ covariance @ inverse.T)

@@ -15,7 +15,7 @@ from bsip_cli.dynamics.pinocchio_model import bodies_of
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.statistics.samples import effective_samples
 
-# --- what the instruments may do wrong, beside the body -------------------------------------------
+# --- what the instruments may do wrong, jointly with the body -------------------------------------
 
 # A plate some millimetres aside looks like a lopsided trunk, and forces some milliseconds late like
 # heavier limbs. Both are unknowns of the same equations: their spread is an option of [identify],
@@ -59,7 +59,7 @@ class Recording:
     """Motion and measured wrench of one trial.
 
     q (N, nq), v and a (N, nv); wrench (N, 6) about the world's origin [N, N m]; use (N,) frames
-    that may enter; rate [Hz]; noise_level (N,) of the accelerations, in any unit: only its course
+    that may enter; rate [Hz]; noise_level (N,) of the accelerations, in any unit: only its shape
     counts.
     """
 
@@ -140,18 +140,18 @@ def accumulate(
     cutoff_hz: float,
     reference_m: np.ndarray,
     weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
-    beside: Instruments | None = None,
+    instruments: Instruments | None = None,
 ) -> NormalEquations:
     """Both sides of the equations through the same low-pass, decimated, weighted and summed.
 
     ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
     of the trials.
     """
-    size = 10 * len(bodies_of(model)) + (INSTRUMENT_COUNT if beside else 0)
+    size = 10 * len(bodies_of(model)) + (INSTRUMENT_COUNT if instruments else 0)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, beside)
+        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, instruments)
         for regressor, wrench, noise_level in blocks:
             root = np.sqrt(weights_at(noise_level))
             measured = root * wrench
@@ -187,7 +187,7 @@ def _filtered_blocks(
     recording: Recording,
     cutoff_hz: float,
     reference_m: np.ndarray,
-    beside: Instruments | None = None,
+    instruments: Instruments | None = None,
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
     (n, 6) about the reference, and the accelerations' noise level (n,)."""
@@ -204,8 +204,8 @@ def _filtered_blocks(
         regressor = wrench_regressor(
             model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
         )
-        if beside:
-            columns = beside.columns(regressor, recording.rate_hz)
+        if instruments:
+            columns = instruments.columns(regressor, recording.rate_hz)
             regressor = np.concatenate([regressor, columns], axis=2)
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
         mine = slice(start, start + _ROWS)
@@ -213,7 +213,7 @@ def _filtered_blocks(
         yield filtered.reshape(rows.shape[0], 6, -1), measured[mine], level
 
 
-# --- how much each component of the wrench may be trusted: residual size, its course, its memory --
+# --- how much each component of the wrench may be trusted: residual size, its shape, its memory ---
 
 # What a fit leaves has two parts: one that is always there (sensors, the model), and one that grows
 # with the noise of the accelerations, which is large where the motion is fast. Both are estimated
@@ -257,7 +257,7 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     """Noise from what a fit leaves, one series per recording."""
     residual = np.concatenate([one.residual for one in series])
     level = np.concatenate([one.noise_level for one in series])
-    fits = [_course(residual[:, c], level) for c in range(6)]
+    fits = [_size_over_time(residual[:, c], level) for c in range(6)]
     steady, with_level = np.array(fits).T
     spread = np.sqrt(_variances(steady, with_level, level))
     ends = np.cumsum([len(one.residual) for one in series])
@@ -268,7 +268,7 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     return Noise(rms, effective, len(residual), steady, with_level)
 
 
-def _course(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
+def _size_over_time(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
     """Standard deviations (steady, per level) of likely Gaussian residuals (n,)."""
     square = residual**2
     mean = max(float(square.mean()), 1e-18)

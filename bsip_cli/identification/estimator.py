@@ -19,8 +19,8 @@ class Problem:
     The next three are options of [identify]: how many times worse the data are than they look; the
     sigma% below which a base parameter counts; and how many deviations as large as [prior] says
     count with this person's own. ``whole``: the equations before the wrench of segments that keep
-    the table's values was taken off; None where no segment does. ``beside``: the equations with the
-    instruments' columns after the parameters.
+    the table's values was taken off; None where no segment does. ``jointly``: the equations with
+    the instruments' columns after the parameters.
     """
 
     equations: NormalEquations
@@ -31,7 +31,7 @@ class Problem:
     sigma_percent_limit: float = 5.0
     spread_weight: float = 4.0
     whole: NormalEquations | None = None
-    beside: NormalEquations | None = None
+    jointly: NormalEquations | None = None
 
     def every_equation(self) -> NormalEquations:
         """Those of all segments' parameters."""
@@ -43,7 +43,7 @@ class Problem:
 
     def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
         """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
-        equations = self.beside or self.equations
+        equations = self.jointly or self.equations
         return equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
 

@@ -57,7 +57,7 @@ def _segments(covariance: np.ndarray) -> np.ndarray:
     return covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]
 
 
-# --- what a motion's information can tell of each segment, beside the table: its data share -------
+# --- what a motion can add to the table on each segment: how much the data decide -----------------
 
 
 _GROUPS = (("mass", slice(0, 1)), ("centre of mass", slice(1, 4)), ("inertia", slice(4, 10)))

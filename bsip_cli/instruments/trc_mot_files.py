@@ -43,11 +43,11 @@ def rewrite_trc_mot(
     change: Callable[[Instruments], Instruments],
     said: Sequence[str] = (),
 ) -> Instruments:
-    """Write copies of a TRC file and of the MOT file beside it with other readings.
+    """Write copies of a TRC file and of the MOT file next to it with other readings.
 
     A file that does not change is copied as it is, but for what the MOT's header says.
 
-    copy : the TRC file to be written; the MOT file goes beside it. said : what the header of the
+    copy : the TRC file to be written; the MOT file goes next to it. said : what the header of the
         MOT says of the change, a line each.
 
     Raises
@@ -56,7 +56,7 @@ def rewrite_trc_mot(
     """
     mot = forces_beside(trc)
     if mot is None:
-        raise BadDataError("there are no forces beside it", expected="a .mot", file=trc)
+        raise BadDataError("there are no forces next to it", expected="a .mot", file=trc)
     markers, forces = _read_trc(trc), _read_mot(mot)
     sets = _force_sets(forces, mot)
     scale = _scale_m(markers, trc)

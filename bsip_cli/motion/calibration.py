@@ -268,8 +268,8 @@ class FunctionalJoint:
         across = np.cross(self.axis, along)
         across /= np.linalg.norm(across)
         # Seen along the other line: how far to go on the axis until both meet.
-        beside = np.cross(across, along)
-        return self.point + self.axis * ((a - self.point) @ beside) / (self.axis @ beside)
+        normal = np.cross(across, along)
+        return self.point + self.axis * ((a - self.point) @ normal) / (self.axis @ normal)
 
     def in_plane(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
         """(3,) where the axis meets the plane through a, b and c (3,)."""

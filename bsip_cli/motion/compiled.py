@@ -42,7 +42,7 @@ class _InCacheHome(InTreeCacheLocator):
 
 
 class _Places(CompileResultCacheImpl):
-    """NUMBA_CACHE_DIR, else beside the code, else the user's cache folder."""
+    """NUMBA_CACHE_DIR, else next to the code, else the user's cache folder."""
 
     _locator_classes = [  # noqa: RUF012 (as numba declares it)
         UserProvidedCacheLocator,

@@ -150,10 +150,10 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
         return after
     earlier, options = markers_m[first - 1 :: -1], options | {"may_show_nothing": True}
     before = solve_poses(person, earlier, after.q[0], **options)
-    return joined([Poses(*(values[::-1] for values in vars(before).values())), after])
+    return concatenated([Poses(*(values[::-1] for values in vars(before).values())), after])
 
 
-def joined(parts: Sequence[Poses]) -> Poses:
+def concatenated(parts: Sequence[Poses]) -> Poses:
     """Poses of one after the other."""
     return Poses(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
 

@@ -51,7 +51,7 @@ class _Problem:
     squares, neighbours, ends : sums of z z', of z[t] z[t - 1]' and its transpose, and of the
         first and the last sample's z z'.
     places : (p,) where a step may be.
-    after, beside : (p, 1 + k + d) sums of the samples from a place on, and of those from the
+    after, around : (p, 1 + k + d) sums of the samples from a place on, and of those from the
         places before and after it on.
     penalised : (1 + k, 1 + k) ones on the diagonal for the columns, zero for the constant.
     coefficient_sd : prior spread of the columns' coefficients.
@@ -68,7 +68,7 @@ class _Problem:
         self.squares, self.neighbours = z.T @ z, follow + follow.T
         self.ends = np.outer(z[0], z[0]) + np.outer(z[-1], z[-1])
         self.places, self.after = places, from_on[places]
-        self.beside = from_on[places - 1] + from_on[places + 1]
+        self.around = from_on[places - 1] + from_on[places + 1]
         self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
         self.coefficient_sd = coefficient_sd
 
@@ -78,7 +78,7 @@ class _Problem:
 
     def with_steps(self, r: float) -> np.ndarray:
         """(p, 1 + k + d) products of z with a step at each place, both whitened."""
-        return (1.0 + r * r) * self.after - r * self.beside + r * (1.0 - r) * self.z[-1]
+        return (1.0 + r * r) * self.after - r * self.around + r * (1.0 - r) * self.z[-1]
 
     def prior(self, error: float) -> np.ndarray:
         """(1 + k, 1 + k) what the prior adds to the equations."""
@@ -173,13 +173,13 @@ def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
     return float(np.clip(value, 0.0, _LARGEST_CORRELATION))
 
 
-# --- markers that sit elsewhere than in the calibration, throughout a trial or from a moment on ---
+# --- markers that are misplaced since the calibration, throughout a trial or from a moment on -----
 
 
 _OFFSET = 3.0  # trusted distances, and spreads of the marker about its median
 _STANDS_OUT = 5.0  # over the median of all markers' median residuals
 _LEAST_SHARE = 0.1  # of the frames show the marker
-_STAYS_S = 0.5  # at the calibrated place before, and elsewhere after
+_STAYS_S = 0.5  # at the calibrated place before, and at another after
 _IN_PLACE = 0.3  # of the later residual at most, while the marker is in its place
 
 
@@ -252,7 +252,7 @@ class MarkerEvent:
     """One marker that is not where the model may expect it.
 
     partner : the other marker of a swap, else empty.
-    start_s, end_s : a slip lasts until the trial's end, an offset fills the trial.
+    start_s, end_s : a slip holds until the trial's end, an offset fills the trial.
     size_m : length of the jump, the slip or the offset on the segment; of a swap the distance
         between the two places.
     statistic : residual over the spread it is judged against (jump, offset, a slip found as one),
@@ -285,7 +285,7 @@ def event(
     put_right: bool = False,
     note: str = "",
 ) -> MarkerEvent:
-    """An event of marker number ``m`` over a stretch of frames."""
+    """An event of marker number ``m`` over an interval of frames."""
     marker, segment = fit.labels[m], f"the {in_words(fit.segments[m])}"
     other = "" if partner is None else fit.labels[partner]
     start, end = float(fit.times_s[frames.start]), float(fit.times_s[frames.stop - 1])
@@ -334,12 +334,12 @@ def _of_group(group: list[MarkerEvent]) -> str:
     )
 
 
-def pieces(hit: np.ndarray, joined: np.ndarray, longest_break: int) -> list[slice]:
-    """Stretches of hits (N,); ``joined`` frames and short breaks hold two of them together."""
+def pieces(hit: np.ndarray, bridged: np.ndarray, longest_break: int) -> list[slice]:
+    """Intervals of hits (N,); ``bridged`` frames and short breaks hold two of them together."""
     found: list[slice] = []
     for k in hit.nonzero()[0]:
         stop = found[-1].stop if found else 0
-        near = k - stop < longest_break or joined[stop:k].all()
+        near = k - stop < longest_break or bridged[stop:k].all()
         if found and near:
             found[-1] = slice(found[-1].start, int(k) + 1)
         else:

@@ -47,8 +47,8 @@ from bsip_cli.motion.marker_exchange import (
     Refit,
     as_recorded,
     exchanged,
+    exchanged_back,
     misfit_m,
-    put_right,
     refitted,
     swaps,
     with_exchanges,
@@ -63,7 +63,7 @@ _FAR = 3.0  # misfit of the trial over the trusted distance
 _BETTER = 0.5  # misfit exchanged over that as labelled
 _ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
 _LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
-_LATERAL_M = 0.05  # a marker of the trunk this far beside its middle belongs to a side
+_LATERAL_M = 0.05  # a marker of the trunk this far from its middle belongs to a side
 _MIRRORED_M = 0.1  # the places of a pair are mirrored to this
 _FRAMES = 24
 
@@ -90,7 +90,7 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
     if not after < _BETTER * before:
         return as_recorded(fit)
     suspected = [Exchange(a, b, whole, before / after) for a, b in pairs]
-    return put_right(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
+    return exchanged_back(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
 
 
 def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
@@ -240,7 +240,7 @@ _MOST_BLOCKS = 600  # longer ones in longer trials
 _STAYS_S = 0.5  # on each side of a slip
 _SLIP = 3.0  # spreads of what pose and step leave unexplained
 # A normal vector of three directions is this long once in 3e7 draws: 40 markers at 600 places give
-# one false alarm in a thousand trials, were the errors as the model says.
+# one false positive in a thousand trials, were the errors as the model says.
 _CHANCE = 6.0
 # Skin travels over the bone by some 15 mm in half a radian; a slip moves the pose too, by far less
 # for its size, and may not hide behind that.
@@ -397,7 +397,7 @@ class Evidence:
     events: tuple[MarkerEvent, ...]
     markers_m: np.ndarray
 
-    def put_right(self) -> bool:
+    def any_corrected(self) -> bool:
         """Some labels were exchanged back."""
         return any(one.put_right for one in self.events)
 

@@ -18,7 +18,7 @@ _LARGEST_M = 0.2  # a marker farther off says no more
 
 @dataclass(frozen=True)
 class Exchange:
-    """Markers number ``a`` and ``b`` bear each other's labels over a stretch of frames.
+    """Markers number ``a`` and ``b`` bear each other's labels over an interval of frames.
 
     ``statistic`` says how clearly, as in :class:`MarkerEvent`.
     """
@@ -63,7 +63,7 @@ def refitted(fit: MarkerFit, refit: Refit, exchanges: Sequence[Exchange]) -> Mar
     return refit(with_exchanges(fit, exchanges), fit.times_s)
 
 
-def put_right(
+def exchanged_back(
     labelling: Labelling, again: MarkerFit, refit: Refit, suspected: Sequence[Exchange]
 ) -> Labelling:
     """Exchange suspected labels back, but for those that would leave a marker farther off.
@@ -157,7 +157,7 @@ def swaps(labelling: Labelling, refit: Refit) -> Labelling:
         suspected = [Exchange(pair.a, pair.b, piece, pair.ratio) for piece in found]
         again = refitted(fit, refit, suspected)
         if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):
-            labelling = put_right(labelling, again, refit, suspected)
+            labelling = exchanged_back(labelling, again, refit, suspected)
     return labelling
 
 

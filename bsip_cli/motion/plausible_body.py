@@ -21,7 +21,7 @@ _BMI = (12.0, 60.0)  # kg/m2: as where masses and heights are read (stated.py)
 # Rotation from the neutral pose that no healthy joint goes beyond [degrees]. Shoulders may turn
 # over, and wrists, which turn with the forearm here.
 _REACH = {"waist": 110.0, "neck": 120.0, "hip": 160.0, "ankle": 110.0}
-# Joint to joint short, or told by two markers: their lengths say little.
+# Joint to joint short, or held by two markers: their lengths say little.
 _VAGUE = ("lower_torso", "upper_torso", "head", "hand_l", "hand_r")
 
 

@@ -15,7 +15,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.motion.calibration import Calibration
 from bsip_cli.motion.inverse_kinematics import (
     Poses,
-    joined,
+    concatenated,
     model_markers,
     solve_poses,
     solve_trial,
@@ -128,7 +128,7 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
 def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
     """Each frame from its own start: the chosen frames are not neighbours."""
     parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
-    return joined(parts)
+    return concatenated(parts)
 
 
 def _frame_weight(frames: int, options: ScalingOptions) -> float:
@@ -312,7 +312,7 @@ def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.nda
     return column
 
 
-# --- over frames of all trials, without the markers that sit elsewhere there ----------------------
+# --- over frames of all trials, without the markers that are misplaced there --------------------
 
 
 _FRAMES_PER_TRIAL = 400
@@ -348,7 +348,7 @@ def refine_over_trials(
 ) -> Refinement:
     """Fit the geometry to ``frames`` frames of all trials that differ most.
 
-    A marker that sits elsewhere throughout fewer than half of the trials has no say there, since it
+    A marker that is misplaced throughout fewer than half of the trials has no say there, since it
     would drag its place in the model towards the middle: the fit is made again without it.
 
     standing : the one frame that the calibration is like, of the trial with this number.
@@ -369,16 +369,16 @@ def refine_over_trials(
         return refine(person, all_markers[chosen], all_poses[chosen], options, ik)
 
     fit = refined(standing, seen)
-    elsewhere = np.array([_elsewhere(fit.person, one, ik) for one in seen])
-    elsewhere &= elsewhere.mean(axis=0) < _FEW
-    if not elsewhere.any():
+    misplaced = np.array([_misplaced(fit.person, one, ik) for one in seen])
+    misplaced &= misplaced.mean(axis=0) < _FEW
+    if not misplaced.any():
         return fit
-    kept = [one.without(off) for one, off in zip(seen, elsewhere, strict=True)]
-    return refined(standing.without(elsewhere[standing_trial]), kept)
+    kept = [one.without(off) for one, off in zip(seen, misplaced, strict=True)]
+    return refined(standing.without(misplaced[standing_trial]), kept)
 
 
-def _elsewhere(person: Person, one: TrialMarkers, ik: dict) -> np.ndarray:
-    """(m,) markers that sit elsewhere than in the model throughout a trial."""
+def _misplaced(person: Person, one: TrialMarkers, ik: dict) -> np.ndarray:
+    """(m,) markers that are not where the model has them throughout a trial."""
     if not len(one.times_s):
         return np.zeros(len(person.markers), dtype=bool)
     poses = solve_trial(person, one.markers_m, **ik)

@@ -9,7 +9,7 @@ the spline.
 Skin adds noise that is not white: its acceleration has the same power at all frequencies, so it
 grows like 1 / f^4 towards low ones, and it keeps pace with the motion. The best gain against both
 is 1 / (1 + (sigma^2 / tau^2) w^8 + rho w^4) with the skin's share rho: a penalty on the second
-differences beside the one on the fourth.
+differences next to the one on the fourth.
 """
 
 from __future__ import annotations
@@ -238,10 +238,10 @@ def _penalty(
         pace = (sum(_FOURTH[k] * c[k : k + n] for k in range(5)) ** 2).mean(axis=1)
         new = _mean(known, window) / np.maximum(_mean(pace, window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
-        settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
+        converged = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
         penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
-        if settled:
+        if converged:
             break
     return penalty
 

@@ -16,6 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from bsip_cli.errors import printable
+from bsip_cli.report.cause_colours import Piece, fills
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,22 +84,26 @@ class Light(Block):
 
 @dataclass(frozen=True)
 class Bar(Block):
-    """A whole cut into pieces: label and share [%], which add up to 100; a share below zero makes
-    the rest larger and has no length."""
+    """A whole cut into pieces, whose shares [%] add up to 100; a share below zero makes the rest
+    larger and has no length."""
 
     title: str
-    pieces: tuple[tuple[str, float], ...]
+    pieces: tuple[Piece, ...]
 
-    def lengths(self) -> tuple[float, ...]:
-        """[%] of what is above zero."""
-        whole = sum(max(share, 0.0) for _, share in self.pieces)
-        return tuple(100.0 * max(share, 0.0) / whole for _, share in self.pieces)
+    def drawn(self) -> tuple[tuple[Piece, float, str], ...]:
+        """Each piece, its length [%] of what is above zero, and its background."""
+        whole = sum(max(one.share, 0.0) for one in self.pieces)
+        fill = fills(self.pieces)
+        return tuple(
+            (one, 100.0 * max(one.share, 0.0) / whole, fill[one.label].css()) for one in self.pieces
+        )
 
 
 @dataclass(frozen=True)
 class Scale:
     """A number between what is good and what is too large, all in one unit; ``words`` say which it
-    is. Numbers are the texts that are shown."""
+    is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
+    arrow points."""
 
     title: str
     shown: str
@@ -108,6 +113,7 @@ class Scale:
     limit_part: float
     good: str
     limit: str
+    is_beyond: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,7 +225,7 @@ class Document:
 
 
 FILES = "figures"
-"""Folder beside the page that holds its figures and the numbers behind them."""
+"""Folder next to the page that holds its figures and the numbers behind them."""
 
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"

@@ -1,4 +1,4 @@
-"""The causes that a diagnosis looked at, with their numbers as people read them, and how small a cause
+"""The causes that a diagnosis analysed, with their numbers as people read them, and how small a cause
 might have been and still been seen.
 """
 
@@ -69,7 +69,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause that was looked at, with its numbers; ``trials`` are stems of recordings.
+    """A cause that was analysed, with its numbers; ``trials`` are stems of recordings.
 
     probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
     or trial. rms_change : what it does to the component that it changes most [N or N m].
@@ -107,7 +107,7 @@ class Candidate:
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return true_minus(text)
 
-    def told(self, remarks: bool = True) -> str:
+    def in_words(self, remarks: bool = True) -> str:
         """Its sentence with the interval of its main number, and what the markers alone say."""
         main, what = self.main_number(), self.what()
         found = _REMARK.search(self.sentence) if remarks else None
@@ -126,7 +126,7 @@ class Candidate:
         sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
         return max(sizes or self.numbers, key=Number.certainty, default=None)
 
-    def beside_usual(self) -> str:
+    def against_usual(self) -> str:
         """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
         size, usual = self.main_number(), USUAL.get(self.effect)
         if size is None or usual is None or self.effect in OBJECTS:
@@ -204,12 +204,12 @@ def is_large(cause: Sequence[Candidate]) -> bool:
     return first.effect == UNNAMED and not first.target and named == {"error"}
 
 
-_EXAMPLES = (  # effects whose limits are told in the sentence
+_EXAMPLES = (  # effects whose limits are in the sentence
     ("sync_offset", "", "a delay of the forces"),
     ("plate_translation", "", "a plate's shift"),
     ("plate_gain", "fz", "a misreading of vertical forces"),
 )
-OF_THE_WEIGHT = "W"  # group of what quiet standing tells
+OF_THE_WEIGHT = "W"  # group of what quiet stance shows
 
 
 @dataclass(frozen=True)
@@ -249,9 +249,9 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates, axes and recordings
     the worst one; empty without examples."""
     parts = []
-    told = [x for x in limits if x.parameter in ("delay", "x", "y", "gain", "mass")]
+    known = [x for x in limits if x.parameter in ("delay", "x", "y", "gain", "mass")]
     for effect, ends, words in _EXAMPLES:
-        of_it = [x for x in told if x.effect == effect and x.target.endswith(ends)]
+        of_it = [x for x in known if x.effect == effect and x.target.endswith(ends)]
         if of_it:
             worst = max(of_it, key=lambda x: x.size)
             size = f"under {worst.in_words()}" if isfinite(worst.size) else "of any size"
@@ -265,5 +265,5 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
 def analysed(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
     """Stems of the recordings that were diagnosed, those of which something was found before the
     search too."""
-    told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]
-    return tuple(sorted({s for t in (*detection["trials"], *told) for s in str(t).split(", ")}))
+    others = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]
+    return tuple(sorted({s for t in (*detection["trials"], *others) for s in str(t).split(", ")}))

@@ -96,12 +96,12 @@ def unnamed_label(number_name: str, where: str) -> str:
     )
 
 
-_TOLD = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
+_COMPLETE = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
 
 
 def parameter_label(effect: str, parameter: str) -> str:
     """What an interval is of, where the sentence leaves that open; else empty."""
-    return "" if effect in _TOLD else str(_WORDS["parts"].get(parameter, ""))
+    return "" if effect in _COMPLETE else str(_WORDS["parts"].get(parameter, ""))
 
 
 def size_words(parameter: str, unit: str, size: float) -> str:
@@ -143,18 +143,18 @@ def usual_words(effect: str) -> str:
 # --- recordings that separate causes --------------------------------------------------------------
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
-_APART = {pair: one["record"] for one in _WORDS["apart"] for pair in one["causes"]}
-_APART["missing_joint soft_tissue"] = EFFECTS["missing_joint"].remedy
+_DISTINGUISHED_BY = {pair: one["record"] for one in _WORDS["distinguish"] for pair in one["causes"]}
+_DISTINGUISHED_BY["missing_joint soft_tissue"] = EFFECTS["missing_joint"].remedy
 _UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
 
 
-def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
+def separating_recording(causes: Sequence[tuple[str, str]], most: int | None = None) -> str:
     """What to record, without a final stop, for causes that look alike, as (effect, target); at most so many steps."""
-    effects = list(dict.fromkeys(effect for effect, _ in rivals))
-    places = {one: {target for effect, target in rivals if effect == one} for one in effects}
-    advice = [_places(effect, rivals) for effect in effects if len(places[effect]) > 1]
+    effects = list(dict.fromkeys(effect for effect, _ in causes))
+    places = {one: {target for effect, target in causes if effect == one} for one in effects}
+    advice = [_places(effect, causes) for effect in effects if len(places[effect]) > 1]
     for one, other in combinations(effects, 2):
-        known = _APART.get(f"{one} {other}") or _APART.get(f"{other} {one}")
+        known = _DISTINGUISHED_BY.get(f"{one} {other}") or _DISTINGUISHED_BY.get(f"{other} {one}")
         advice += [known] if known else [_own(one), _own(other)]
     each = dict.fromkeys(advice)  # once, and none that another says with more words
     steps = [one for one in each if not any(o != one and o.startswith(one) for o in each)]
@@ -163,9 +163,9 @@ def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = N
     return "; ".join(steps) or _UNKNOWN
 
 
-def _places(effect: str, rivals: Sequence[tuple[str, str]]) -> str:
+def _places(effect: str, causes: Sequence[tuple[str, str]]) -> str:
     """The same effect at several places: they have to move, or be loaded, one at a time."""
-    where = listing([place_label(effect, target) for name, target in rivals if name == effect])
+    where = listing([place_label(effect, target) for name, target in causes if name == effect])
     if effect in _LOADS:
         return f"look for what is worn or loose there, or keep still but for one at a time: {where}"
     if effect in ("unmeasured_contact", "external_force"):

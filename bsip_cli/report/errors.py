@@ -10,7 +10,9 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
+from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
@@ -84,7 +86,7 @@ def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
 
 
 def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
-    """Root mean square over all frames, of those of stretches of so many frames."""
+    """Root mean square over all frames, of those of intervals of so many frames."""
     frames = [gain.frames for gain in gains]
     methods = [m for m in METHODS if all(m in gain.of for gain in gains)]
     return {
@@ -146,7 +148,7 @@ def _compared(first: pd.Series) -> str:
     n = int(first["trials"])
     where = {
         "whole_trials": f"in {count(n, 'other recording')} ",
-        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
@@ -171,7 +173,7 @@ def _change(ratio: float, log_error: float) -> str:
     return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
 
 
-# --- three numbers of a recording beside what good laboratories and the literature have -----------
+# --- three numbers of a recording against those of good laboratories and the literature -----------
 
 
 COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
@@ -179,6 +181,9 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
+ENDS_AT = 2.0
+"""Times the size that is called large, where every scale ends."""
+
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
@@ -206,17 +211,18 @@ class Yardstick:
         return "good" if value <= self.good else "ordinary"
 
     def scale(self, value: float) -> Scale:
-        """The number on its way from nothing to a quarter beyond the limit, or beyond itself."""
-        end = max(1.25 * self.limit, 1.1 * value) if np.isfinite(value) else 1.25 * self.limit
+        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
+        end = ENDS_AT * self.limit
         return Scale(
             self.title,
             f"{number(value)} {self.unit}",
             self.words(value),
-            value / end if np.isfinite(value) else 0.0,
+            min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
             f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
             f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
+            bool(value > end),
         )
 
 
@@ -281,15 +287,7 @@ _WORDS = {
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
-LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
-
-
-@dataclass(frozen=True)
-class Piece:
-    """What some terms, taken together where they look alike, make of an error [%]."""
-
-    label: str
-    share: float
+LEAST_REPORTED_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
 def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tuple[Piece, ...]:
@@ -316,9 +314,9 @@ def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
 
 
 def _overall(budget: pd.DataFrame) -> pd.DataFrame:
-    told = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_TOLD_SIZE]
+    large = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_REPORTED_SIZE]
     mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
-    by_term = mine[mine["component"].isin(told)].groupby("term", sort=False)
+    by_term = mine[mine["component"].isin(large)].groupby("term", sort=False)
     alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
     return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
 
@@ -328,7 +326,8 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     large, last = [], []
     for terms in _groups(rows):
         label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
-        piece = Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
+        share = float(rows.loc[list(terms), "share_percent"].sum())
+        piece = Piece(label, share, tuple(dict.fromkeys(map(_kind, terms))))
         least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
@@ -336,7 +335,7 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
             large.append(piece)
     large.sort(key=lambda one: -one.share)
     others = 100.0 - sum(one.share for one in (*large, *last))
-    rest = [Piece(REST, others)] if abs(others) >= _LEAST else []
+    rest = [Piece(REST, others, (cause_colours.REST,))] if abs(others) >= _LEAST else []
     return (*large, *rest, *last)
 
 
@@ -357,6 +356,10 @@ def term_words(term: str) -> str:
     if term.startswith(_FAULT):
         return EFFECT_WORDS[term.removeprefix(_FAULT)].title
     return _WORDS[term]
+
+
+def _kind(term: str) -> str:
+    return cause_colours.FAULT if term.startswith(_FAULT) else term
 
 
 def _label(term: str, found: Collection[str]) -> str:
@@ -386,7 +389,7 @@ def budget_sentences(budget: pd.DataFrame, found: Collection[str]) -> tuple[str,
 def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> str:
     size, unit = size_of(budget, component)
     total = _total(budget, component)
-    if total is None or not size >= LEAST_TOLD_SIZE:
+    if total is None or not size >= LEAST_REPORTED_SIZE:
         return ""
     shares = pieces(budget, component, found)
     parts = [f"{one.label} {number(one.share, 0)} %" for one in shares]

@@ -30,6 +30,7 @@ from bsip_cli.report.candidates import (
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
+    ENDS_AT,
     FORCE_LIMIT_PERCENT,
     MARKERS,
     SOURCES,
@@ -48,7 +49,7 @@ from bsip_cli.report.verdict import (
     light_of,
     unseen,
 )
-from bsip_cli.report.words import METHODS, capital, count, listing, number
+from bsip_cli.report.words import METHODS, abbreviations, capital, count, listing, number
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -78,7 +79,11 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        Paragraph(f"Root mean square (RMS), with {METHODS[record.use()]}. {SOURCES}", "note"),
+        Paragraph(
+            f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
+            f"{ENDS_AT:g} × large. {SOURCES}",
+            "note",
+        ),
         *_sure(record, light),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
@@ -115,7 +120,8 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
     dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
     saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
-    yield "Recordings", f"{listing(tasks)}{saved}"
+    short = abbreviations(names)
+    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
@@ -192,7 +198,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
         yield Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
-            tuple((piece.label, piece.share) for piece in pieces),
+            pieces,
         )
 
 
@@ -218,9 +224,9 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     said += consequences(causes[:_MOST], only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
     for k, cause in groups[:1]:
-        rivals = [(one.effect, one.target) for one in cause]
+        members = [(one.effect, one.target) for one in cause]
         on_scale = cause[0].class_id == OF_THE_WEIGHT
-        step = "weigh the person on a scale" if on_scale else separating_recording(rivals, most=1)
+        step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:

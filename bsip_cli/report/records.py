@@ -139,9 +139,9 @@ def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarra
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
     methods = sorted(reconstruction["method"].unique(), key=method_rank)
     clock = clock_of(reconstruction)
-    courses = reconstruction[["method", "time_s", column]].groupby("method")
+    signals = reconstruction[["method", "time_s", column]].groupby("method")
     return {
-        name: courses.get_group(name)
+        name: signals.get_group(name)
         .drop_duplicates("time_s")
         .set_index("time_s")[column]
         .reindex(clock)

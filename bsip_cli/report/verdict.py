@@ -55,7 +55,7 @@ from bsip_cli.statistics.methods import OM, RM
 ALL_FAULTS = "wrong"
 """Address of the section that has all of them."""
 
-_UNTOLD = 1e-3  # probabilities this near to 0 or 1 are not told in digits
+_NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
 _MOST_MEMBERS = 2  # of a group, in a line
@@ -63,7 +63,7 @@ _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
-_OF_THE_LAB = (
+_OF_THE_LABORATORY = (
     "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
 CAUSE_UNKNOWN = "cause unknown"
@@ -155,9 +155,9 @@ def light_of(
     nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
-        besides = "besides it " if found and any(map(is_large, causes)) else ""
+        more = "also " if found and any(map(is_large, causes)) else ""
         error = f"Large error{mostly(budget, effects_in(causes), use)}"
-        title = "; ".join(filter(None, (error, f"{besides}{found}")))
+        title = "; ".join(filter(None, (error, f"{more}{found}")))
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
     if not causes:
@@ -210,7 +210,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{one.beside_usual()}{sure}."
+    return f"{capital(one.in_words(remarks=one.is_of_all))}, {where}{one.against_usual()}{sure}."
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -244,19 +244,19 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     first = cause[0]
     places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], _how_sure(cause)
     if len(cause) == 1:
-        return f"{capital(first.told())}{places[0]}. {sure}".rstrip()
+        return f"{capital(first.in_words())}{places[0]}. {sure}".rstrip()
     common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
     members = []
     for k, (one, place) in enumerate(zip(cause, own, strict=True)):
         words = probability_words(one.probability)
         probability = f", probability {words}" if words else ""
-        members.append(f"({_letter(k)}) {one.told()}{place}{probability}")
-    apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
+        members.append(f"({_letter(k)}) {one.in_words()}{place}{probability}")
+    steps = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
-        apart = f"weigh the person on a scale; {apart}"
+        steps = f"weigh the person on a scale; {steps}"
     return (
         f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
-        f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
+        f"{sure}{' ' if sure else ''}To distinguish them: {steps}."
     )
 
 
@@ -265,7 +265,7 @@ def _letter(number: int) -> str:
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
-    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those looked at."""
+    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those analysed."""
     names = [trial_label(stem) for stem in trials]
     if len(everywhere) > 1 and set(trials) >= set(everywhere):
         return (
@@ -309,9 +309,9 @@ def probability_words(probability: float) -> str:
     """``99.5 %`` or ``over 99.9 %``; empty where there is none."""
     if np.isnan(probability):
         return ""
-    if probability > 1 - _UNTOLD:
+    if probability > 1 - _NEARLY_SURE:
         return "over 99.9 %"
-    return f"{number(100 * probability, 1)} %" if probability >= _UNTOLD else "under 0.1 %"
+    return f"{number(100 * probability, 1)} %" if probability >= _NEARLY_SURE else "under 0.1 %"
 
 
 # --- what it does -----------------------------------------------------------------------------
@@ -397,7 +397,7 @@ def consequences(
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
         if only_actions and (is_large(cause) or len(cause) > 1):
-            continue  # of these it is said elsewhere where to look, and what to record
+            continue  # of these another line says where to look, and what to record
         for meaning, action in _consequences_of(cause):
             text = action if only_actions else f"{meaning} {action}".rstrip()
             numbers.setdefault(text, []).append(k)
@@ -414,7 +414,7 @@ def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
     known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
-    lab = ((_OF_THE_LAB, ""),) if all(one.scope == "laboratory" for one in cause) else ()
+    lab = ((_OF_THE_LABORATORY, ""),) if all(one.scope == "laboratory" for one in cause) else ()
     return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
@@ -107,6 +107,22 @@ def task_of(stem: str) -> str:
     """``sequence`` for sub-01_task-sequence_run-1."""
     match = _STEM.fullmatch(stem)
     return match["task"] if match else stem
+
+
+_ABBREVIATIONS = {
+    "CMJ": "countermovement jump",
+    "DJ": "drop jump",
+    "SJ": "squat jump",
+    "STS": "sit to stand",
+    "TUG": "timed up and go",
+}
+"""Usual names of tasks that people may not know."""
+
+
+def abbreviations(tasks: Iterable[str]) -> str:
+    """``DJ: drop jump; STS: sit to stand``, of those in names of tasks; empty without any."""
+    found = {short for task in tasks for short in re.findall(r"[A-Z]{2,3}(?![A-Z])", task)}
+    return "; ".join(f"{x}: {words}" for x, words in _ABBREVIATIONS.items() if x in found)
 
 
 def labelled(text: str) -> str:

@@ -27,7 +27,7 @@ def why_stale(unit: Unit) -> str:
     for kind in unit.stage.writes:
         if why := _why_not(unit, kind, "made_by"):
             return why
-        if names := _changed_files(unit, kind):  # beside the artifact: pages, figures, tables
+        if names := _changed_files(unit, kind):  # next to the artifact: pages, figures, tables
             return f"{names[0]} has changed since bsip wrote it"
     amended = (_why_not(unit, kind, "amended_by") for kind in unit.stage.amends)
     return next(filter(None, amended), "")
@@ -136,7 +136,7 @@ def _changed_files(unit: Unit, kind: str) -> list[str]:
 
 def _changed(unit: Unit, kind: str) -> list[str]:
     path = unit.path(kind)
-    if not path.is_file():  # a folder in its place is told when it is to be written
+    if not path.is_file():  # a folder in its place is reported when it is to be written
         return []
     try:
         read_header(path, kind)

@@ -121,8 +121,10 @@ def open_study(
             remedy = "correct [ingest] prefixes in study.toml"
             _check_known("ingest.prefixes", config.ingest.prefixes, known, remedy)
     make_out(out, root)
-    told = (Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals)
-    return OpenedStudy(study, config, (*_notes(*study.notes), *told))
+    outcomes = (
+        Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals
+    )
+    return OpenedStudy(study, config, (*_notes(*study.notes), *outcomes))
 
 
 def _left_behind(out: Path, study: Study) -> str:
@@ -161,7 +163,7 @@ def follow(
     """
     outcomes, voice = list(refusals), _Voice(verbose, quiet)
     for outcome in outcomes:
-        voice.tell(outcome)
+        voice.report(outcome)
     off = True if quiet else None  # None: where nobody watches
     bar = tqdm(total=total, desc=command, bar_format=_BAR, smoothing=0, disable=off)
     with bar as progress, closing(running):  # whatever happens here, no process goes on
@@ -170,8 +172,8 @@ def follow(
             steps, is_idle = cost(outcome), outcome.state in ("fresh", "waiting")
             progress.total -= steps if is_idle else 0
             progress.update(0 if is_idle or outcome.state == "noted" else steps)
-            voice.tell(outcome)
-    voice.tell_of_the_others()
+            voice.report(outcome)
+    voice.report_the_others()
     if not quiet:
         _summary(command, outcomes, out)
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
@@ -184,13 +186,13 @@ class _Voice:
 
     verbose: bool
     quiet: bool
-    told: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    said: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
-    def tell(self, outcome: Outcome) -> None:
+    def report(self, outcome: Outcome) -> None:
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
             general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
-            alike = self.told.setdefault((outcome.stage, general), [])
+            alike = self.said.setdefault((outcome.stage, general), [])
             if is_finding or not alike:
                 _say(outcome, sentence)
             whose = re.search(_NAME, sentence)
@@ -199,8 +201,8 @@ class _Voice:
             what = f"{outcome.seconds:.1f} s; read {', '.join(outcome.reads)}"
             _say(outcome, f"{outcome.unit}: {what}")
 
-    def tell_of_the_others(self) -> None:
-        for (stage, sentence), units in self.told.items():
+    def report_the_others(self) -> None:
+        for (stage, sentence), units in self.said.items():
             if len(units) > 1:
                 others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
                 _write(stage, others)

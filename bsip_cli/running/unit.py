@@ -75,7 +75,7 @@ class Unit:
         return self.trial
 
     def warn(self, message: str) -> None:
-        """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
+        """For the user when the unit is done or refused, and the reader of its artifacts later."""
         self.messages.append(printable(message))
 
     def say(self, sentence: str) -> None:
@@ -177,11 +177,11 @@ class Unit:
         """What the unit reads of a participant, or of the group: artifacts, refusals."""
         names, kinds = self._names(participant), self.stage.inputs
         own = [kind for kind in kinds if (SCHEMAS[kind].level == "cohort") == (not participant)]
-        paths = [path for kind in own for path in self._standing(kind, participant, names)]
+        paths = [path for kind in own for path in self._valid(kind, participant, names)]
         if participant is not None and self.trial is None:
             owners = [participant.id, *(trial.stem for trial in participant.trials)]
             before = takewhile(lambda stage: stage.label != self.stage.label, STAGES)
-            folder = self.out / participant.id  # reports tell of them
+            folder = self.out / participant.id  # reports speak of them
             paths += [folder / name for name in _refusals(names, owners, tuple(before))]
         return {path.name: path for path in paths}
 
@@ -190,14 +190,14 @@ class Unit:
         paths = (Path(getattr(self.config, name)) for name in named)
         return {path.name: path for path in paths if path.suffix == ".toml"}
 
-    def _standing(
+    def _valid(
         self, kind: str, participant: Participant | None, names: Collection[str]
     ) -> list[Path]:
         """Artifacts of a kind that the unit reads: its own, or those of all trials below it."""
         below = participant and SCHEMAS[kind].level == "trial" and self.trial is None
         trials = participant.trials if participant and below else (self.trial,)
-        standing = (one for one in trials if self.stands(kind, one, participant, names))
-        return [self.path(kind, one, participant) for one in standing]
+        valid = (one for one in trials if self.stands(kind, one, participant, names))
+        return [self.path(kind, one, participant) for one in valid]
 
     def missing(self) -> list[str]:
         """Kinds the unit cannot do without and that are not there.
@@ -213,7 +213,7 @@ class Unit:
     def _has(self, kind: str) -> bool:
         if SCHEMAS[kind].level == "cohort" or self.participant is not None:
             whose = None if SCHEMAS[kind].level == "cohort" else self.participant
-            return bool(self._standing(kind, whose, self._names(whose)))
+            return bool(self._valid(kind, whose, self._names(whose)))
         return any(
             self.path(kind, trial, person).exists()
             for person in self.study.participants
@@ -247,7 +247,7 @@ class Unit:
             files = self.inputs()
             hashes = {name: file_hash(path) for name, path in files.items() if path.exists()}
             of_all = [k for k in self.stage.inputs if SCHEMAS[k].level == "cohort" and self._has(k)]
-            for kind in of_all:  # what a result of the group tells its participants
+            for kind in of_all:  # what a result of the group says to its participants
                 answer = json.dumps(self.facts(kind)["answer"], sort_keys=True)
                 hashes[f"{kind} of the group"] = hashlib.sha256(answer.encode()).hexdigest()
             return hashes

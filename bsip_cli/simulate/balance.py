@@ -296,13 +296,13 @@ def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np
         rise = integral(speed, dt)
         rise = rise - rise[-1]
         height[first : last + 1] += rise
-        k = HALF_WIDTH + 1  # beside the edges, where differences reach out of the flight
+        k = HALF_WIDTH + 1  # next to the edges, where differences reach out of the flight
         takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * dt)])
         landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * dt)])
         height[first - before : first] += _from_rest(takeoff, before, dt)
         # the same bridge, run backwards in time
-        settled = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
-        height[last + 1 : last + 1 + after] += settled[::-1]
+        landed = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
+        height[last + 1 : last + 1 + after] += landed[::-1]
     return height
 
 

@@ -40,7 +40,8 @@ nominal in flight. None of the thorax where the trunk is stiff."""
 def clavicle_turn(arm_in_thorax: np.ndarray, own_rad: np.ndarray, sign: float) -> np.ndarray:
     """(T, 3, 3) rotation of a clavicle against the thorax, none where the arm hangs.
 
-    arm_in_thorax : (T, 3, 3). own_rad : (T, 2) raised and brought forward beside the arm's rhythm.
+    arm_in_thorax : (T, 3, 3). own_rad : (T, 2) raised and brought forward on top of the arm's
+    rhythm.
     sign : 1 of the right side, -1 of the left one.
     """
     part = (1.0 - arm_in_thorax[:, 1, 1]) / RAISED

@@ -118,7 +118,7 @@ def response(
 
 
 def runs(mask: np.ndarray) -> list[slice]:
-    """The stretches of samples where the mask (T,) holds."""
+    """The intervals of samples where the mask (T,) holds."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -182,7 +182,7 @@ def soft_polyline(
     return result
 
 
-def wander(
+def slow_drift(
     t_s: np.ndarray, rng: np.random.Generator, size: float, lowest_hz: float, highest_hz: float
 ) -> np.ndarray:
     """Random slow signal of standard deviation `size`: a sum of eight sinusoids."""

@@ -20,8 +20,8 @@ from bsip_cli.simulate.numerics import (
     euler_zxy,
     rotate,
     second_derivative,
+    slow_drift,
     step,
-    wander,
 )
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 
@@ -127,9 +127,9 @@ class Plan:
 
     angles_rad : waist, neck (T, 3): flexion about Z, about X, about Y;
         spine (T, 3), if given: the same, of the thorax on the abdomen;
-        girdle_* (T, 2), if given: clavicle raised and brought forward beside what the arm's rhythm
-        does; shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,): flexion;
-        wrist_* (T, 3): flexion, radial deviation, pronation.
+        girdle_* (T, 2), if given: clavicle raised and brought forward on top of what the arm's
+        rhythm does; shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,):
+        flexion; wrist_* (T, 3): flexion, radial deviation, pronation.
     pelvis_angles_rad : (T, 3) about Z, X, Y in the walkway frame; (nominal in flight).
     pelvis_m : (T, 3) nominal path of the lumbar joint centre.
     feet : by side, "l" and "r".
@@ -348,9 +348,11 @@ def plate_under(sketch: Sketch, rng: np.random.Generator) -> tuple[float, float]
 
 
 def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float) -> None:
-    """Slow wandering of the COP: along the feet, and between them while both carry load."""
-    ahead = wander(sketch.t_s, rng, scale * SWAY_M[0], 0.15, 0.8)
-    aside = wander(sketch.t_s, rng, scale * SWAY_M[1], 0.15, 0.8) / (2.0 * sketch.half_stance_m())
+    """Slow drift of the COP: along the feet, and between them while both carry load."""
+    ahead = slow_drift(sketch.t_s, rng, scale * SWAY_M[0], 0.15, 0.8)
+    aside = slow_drift(sketch.t_s, rng, scale * SWAY_M[1], 0.15, 0.8) / (
+        2.0 * sketch.half_stance_m()
+    )
     aside *= 4.0 * sketch.feet["r"].share * sketch.feet["l"].share
     for side, sign in SIDE_SIGN.items():
         sketch.feet[side].cop_ahead_m += ahead
@@ -358,10 +360,10 @@ def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float) -> None:
 
 
 def add_breath_of_motion(sketch: Sketch, rng: np.random.Generator, size_rad: float) -> None:
-    """Tiny wandering of all joint angles of the upper body, and of the pelvis."""
+    """Tiny drift of all joint angles of the upper body, and of the pelvis."""
     for angle in [*sketch.angles.values(), sketch.pelvis_angles]:
         for column in np.atleast_2d(angle.T):
-            column += wander(sketch.t_s, rng, size_rad, 0.15, 0.7)
+            column += slow_drift(sketch.t_s, rng, size_rad, 0.15, 0.7)
 
 
 def add_squat(sketch: Sketch, down: np.ndarray, depth_m: float) -> None:

@@ -140,7 +140,7 @@ def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
 
 
 def _contacts(plan: Plan) -> tuple[Contact, ...]:
-    """The loaded stretches of each foot within the recording, in order of time."""
+    """The loaded intervals of each foot within the recording, in order of time."""
     contacts = []
     for side, foot in plan.feet.items():
         share, cop, on_plate = (a[plan.keep] for a in (foot.share, foot.cop_m, foot.on_plate))

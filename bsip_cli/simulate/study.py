@@ -1,4 +1,4 @@
-"""Write a whole study folder with a known truth beside it."""
+"""Write a whole study folder with a known truth next to it."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.support import Support
-from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.words import count, listing, number
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.choice import (
@@ -63,7 +63,7 @@ def run(unit: Unit) -> None:
     movements = dict.fromkeys(judge.trial.task for judge in judges)
     by_movement = {one: [judge for judge in judges if judge.trial.task == one] for one in movements}
     of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
-    # every movement counts once; of a single one, as far as its own trials tell
+    # every movement counts once; of a single one, as far as its own trials show
     over_all = next(iter(of_each.values()), _UNKNOWN)
     if len(of_each) > 1:
         logs = {pair: [one[pair].log for one in of_each.values()] for pair in PAIRS}
@@ -182,7 +182,7 @@ def _within(unit: Unit, trial: Trial, components: list[int], pair: Pair) -> Diff
     residuals = np.array(signals)[..., components] - measured[_SIGNALS].to_numpy()[:, components]
     residuals[:, ~np.isfinite(residuals).all(axis=0)] = np.nan  # over the same frames, as in fit
     first, second = (residuals[METHODS.index(name)] for name in pair)
-    return within(first, second, stretches(judged))
+    return within(first, second, valid_intervals(judged))
 
 
 # --- differences ------------------------------------------------------------------------------

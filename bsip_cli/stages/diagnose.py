@@ -51,9 +51,9 @@ def run(unit: Unit) -> None:
         found, library, held = _searched(unit, free, known)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
-        told = {(one.effect, one.target) for one in more if one.verdict == "named"}
-        if any((one.effect, one.target) in told for one in findings):
-            findings = ()  # the movements tell which cause of the class of the stated mass it is
+        named = {(one.effect, one.target) for one in more if one.verdict == "named"}
+        if any((one.effect, one.target) in named for one in findings):
+            findings = ()  # the movements show which cause of the stated mass's group it is
         findings = (*findings, *more)
         findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
         facts |= facts_of(found, held, findings)
@@ -73,7 +73,7 @@ def run(unit: Unit) -> None:
             limits = known.limits(limits)
     findings = (*(one.held.finding(one.trial.stem) for one in trials if one.held), *findings)
     budget, large = error_budget(unit, trials, facts["causes"])
-    findings = (*_beside(findings, large), *findings)
+    findings = (*_not_reported_yet(findings, large), *findings)
     if not trials:
         unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")
     names = dict.fromkeys(
@@ -95,10 +95,10 @@ def _searched(
 ) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, given what the markers prove and other persons show."""
     options = unit.config.diagnosis
-    told = [
-        x.for_faults if known is None else known.beside(x.for_faults, not x.moves) for x in trials
+    given = [
+        x.for_faults if known is None else known.given_to(x.for_faults, not x.moves) for x in trials
     ]
-    session = session_of(told)
+    session = session_of(given)
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
     slips = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]
@@ -126,11 +126,11 @@ def _of_markers(
             yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
 
 
-def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
+def _not_reported_yet(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
     """Large errors, less the trials already reported with an error of unknown cause."""
-    told = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
+    named = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
     for one in large:
-        if trials := tuple(t for t in one.trials if t not in told):
+        if trials := tuple(t for t in one.trials if t not in named):
             yield replace(one, trials=trials)
 
 

@@ -22,7 +22,7 @@ def run(unit: Unit) -> None:
         unit.write("diagnosis", empty_table("diagnosis"))
         return
     concerned = np.array([stem in trials.split(", ") for trials in overall["trials"]], dtype=bool)
-    classes = set(overall["class_id"][concerned]) - {""}  # rivals of other trials belong to them
+    classes = set(overall["class_id"][concerned]) - {""}  # those of other trials belong to them
     concerned |= overall["class_id"].isin(classes).to_numpy()
     rows = overall[concerned & (overall["effect"] != "none").to_numpy()]
     if (rows["verdict"] == "rejected").all():
@@ -41,7 +41,7 @@ _STEP = 1e-3  # of the typical size
 
 
 def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFrame:
-    """One row per parameter; where nothing is named in the trials that were looked at, a first row
+    """One row per parameter; where nothing is named in the trials that were analysed, a first row
     that says so."""
     if trials and all(one.verdict == "rejected" for one in findings):
         least = pd.Series([one.p_value for one in findings], dtype=float).min()

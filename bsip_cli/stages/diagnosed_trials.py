@@ -41,11 +41,11 @@ from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
 STATIC = "static"
-_ORIGINS = {"origin_sd_m": 0.0}  # joint centres are a term of their own beside the body
+_ORIGINS = {"origin_sd_m": 0.0}  # joint centres are a term of their own, jointly with the body
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
 _FAR_OFF = 3.5
 _READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
-_LEAST_SAMPLES = 4  # of the filtered residual, for its course to be one
+_LEAST_SAMPLES = 4  # of the filtered residual, for it to be a signal
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""extend: the model with the named causes, beside RM and OM, and what it gains.
+"""extend: the model with the named causes, compared with RM and OM.
 
 Of a person the parameters identified again, of each trial the extended model's wrench and its gain
 on data not used to size it, of the person what that gains over all trials that it concerns.
@@ -50,7 +50,7 @@ from bsip_cli.stages.reconstruct import (
     reconstruction_rows,
     scale_of,
 )
-from bsip_cli.stages.trial_scene import blocks_of, body_beside, causes_of, scene_of
+from bsip_cli.stages.trial_scene import blocks_of, body_as_sized, causes_of, scene_of
 from bsip_cli.statistics.choice import BlockErrors, block_errors, pooled
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 from bsip_cli.study.study import Trial
@@ -89,7 +89,7 @@ def _extended(
 ) -> pd.DataFrame:
     """Rows of ``bsip`` per number of causes in the model."""
     methods, parameters = parameters_of(bsip, person)
-    phi = body_beside(unit, parameters[:, methods.index(RM)])
+    phi = body_as_sized(unit, parameters[:, methods.index(RM)])
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
     rows = bsip[bsip["method"] == OM]
@@ -167,7 +167,7 @@ def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
     return table[column_names("extended-skeleton")]
 
 
-# --- a trial: the extended model beside RM and OM -------------------------------------------------
+# --- a trial: the extended model, RM and OM -----------------------------------------------------
 
 
 def run_trial(unit: Unit) -> None:
@@ -214,7 +214,7 @@ def _scene(
     """The trial with the body for which the causes were sized; parameters (10 n,) of OM and of
     each extended model, loads included."""
     methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
-    scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index(RM)]))
+    scene = scene_of(unit, person, body_as_sized(unit, phi[:, methods.index(RM)]))
     carried = phi + load_phi(unit, person)[:, None]
     return scene, dict(zip(methods, carried.T, strict=True))
 

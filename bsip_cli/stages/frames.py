@@ -72,7 +72,7 @@ def coordinates_from(
 def acceleration_noise(frame: pd.DataFrame, skeleton: Skeleton) -> np.ndarray:
     """(N,) noise level of the pelvis' acceleration [m/s2] of a ``kinematics`` table.
 
-    All coordinates are smoothed alike, so theirs run the same course.
+    All coordinates are smoothed alike, so theirs have the same shape over time.
     """
     linear = frame[[f"sd_{name}" for name in skeleton.v_names[:3]]].to_numpy()
     return np.sqrt((linear**2).mean(axis=1))

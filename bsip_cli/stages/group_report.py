@@ -41,7 +41,10 @@ def record_of(unit: Unit) -> CohortRecord:
     """Everything that is there of the whole study."""
     facts = unit.facts("values")
     options = unit.config.stats
-    criteria, told = Criteria(options.alpha, options.equivalence_percent), unit.read("comparisons")
+    criteria, compared = (
+        Criteria(options.alpha, options.equivalence_percent),
+        unit.read("comparisons"),
+    )
 
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
@@ -56,7 +59,7 @@ def record_of(unit: Unit) -> CohortRecord:
             for person in unit.study.participants
         ),
         ratios=ratios_of(read),
-        tables=build_tables(told, criteria, facts["fitted_on"], facts["missing"]),
+        tables=build_tables(compared, criteria, facts["fitted_on"], facts["missing"]),
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(
             f"{gone['sentence']}: not in table{'s' if len(gone['tables']) > 1 else ''} "
@@ -78,10 +81,10 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
 def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]) -> Member:
     has_page = unit.path("report-files", participant=participant).exists()
     facts = unit.facts("report-files", participant=participant) if has_page else {}
-    told = _read(unit, "identification", participant)
-    shown = {"person": _read(unit, "person", participant), "identification": told}
-    if len(told):
-        shown["identification"] = told[told["method"] == OM]
+    identified = _read(unit, "identification", participant)
+    shown = {"person": _read(unit, "person", participant), "identification": identified}
+    if len(identified):
+        shown["identification"] = identified[identified["method"] == OM]
     first = {
         kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()

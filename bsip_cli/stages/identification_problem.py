@@ -11,7 +11,7 @@ import pandas as pd
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.base_parameters import find_basis
-from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.equations import (
@@ -84,7 +84,7 @@ def recordings_of(
         if not use.any():
             unit.say(f"{trial.stem} has no frame with all contacts on plates; left out")
             continue
-        for start, stop in stretches(use):
+        for start, stop in valid_intervals(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
         motion = coordinates_from(kinematics, person.skeleton)
         measured = np.nan_to_num(wrench[WRENCH].to_numpy())
@@ -142,6 +142,6 @@ def problem_of(
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
         last = None if left else instruments  # the weights need the body alone
         joint = accumulate(model, recordings, cutoff, reference, noise.weights_at, last)
-    beside, whole = joint.with_known(prior.phi, known), joint.of_the_body(len(prior.phi))
-    equations = beside.of_the_body(len(prior.phi))
-    return Problem(equations, noise, prior, basis, *judgement, whole, beside), reference
+    jointly, whole = joint.with_known(prior.phi, known), joint.of_the_body(len(prior.phi))
+    equations = jointly.of_the_body(len(prior.phi))
+    return Problem(equations, noise, prior, basis, *judgement, whole, jointly), reference

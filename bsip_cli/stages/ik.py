@@ -34,7 +34,7 @@ def run(unit: Unit) -> None:
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
     poses, decided = _solved(unit, person, markers)
     evidence = _evidence(unit, person, markers, filled, times, poses)
-    if evidence.put_right():
+    if evidence.any_corrected():
         poses, decided = _solved(unit, person, evidence.markers_m)
     known, angle_sd = _determined(unit, person, poses, decided)
     rate = 1.0 / float(np.median(np.diff(times)))

@@ -40,7 +40,7 @@ def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
     recording = assemble(opened(unit, unit.own_trial, session.written), session)
-    marker_set, told = _marker_set(unit, recording)
+    marker_set, about_set = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, prefix_of(unit)
     )
@@ -55,7 +55,7 @@ def run(unit: Unit) -> None:
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *told, *paired, *match.findings, *repeats]
+    findings = [*recording.findings, *about_set, *paired, *match.findings, *repeats]
     zeros: dict[str, list[float]] = {}
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed, zeros = _without_zero(recording)
@@ -74,7 +74,7 @@ def run(unit: Unit) -> None:
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
     loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
     found = _contacts(unit, recording, filled.markers_m, segments, loads, about)
-    contacts, stretches, about_mass = found
+    contacts, intervals, about_mass = found
     table, tolerance = unit.person, unit.config.ingest.mass_tolerance_percent
     stated_otherwise = against_table(recording.stated, table.mass_kg, table.height_m, tolerance)
     why, taken = recording.forces_note, "took the markers alone; no frame is compared"
@@ -88,7 +88,7 @@ def run(unit: Unit) -> None:
     times = recording.time_s()
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
-    known = {"mass_stretches": [one.record() for one in stretches], "zeros": zeros}
+    known = {"mass_stretches": [one.record() for one in intervals], "zeros": zeros}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
     corners = [
         {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
@@ -168,8 +168,8 @@ def _contacts(
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
     feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
-    stretches = stretches_of(markers, feet.total_N, shown, rate_hz)
-    mass, stands_kg, about_mass = _mass_on_plates(unit, stated, stretches)
+    intervals = stretches_of(markers, feet.total_N, shown, rate_hz)
+    mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
     alone = {
         load.name: stretches_of(markers, load.force_z_N, shown & bears_alone(load, loads), rate_hz)
         for load in loads
@@ -179,11 +179,11 @@ def _contacts(
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
-    return contact_windows(feet, trunk, mass, rate_hz, stands_kg), stretches, about_mass
+    return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
 
 
 def _mass_on_plates(
-    unit: Unit, stated: StatedMass | None, stretches: tuple[Stretch, ...]
+    unit: Unit, stated: StatedMass | None, intervals: tuple[Stretch, ...]
 ) -> tuple[float | None, float | None, list[Finding]]:
     """The mass [kg] on the plates, known loads included, what the trial's plates show for sure, and
     what is said of both.
@@ -193,17 +193,17 @@ def _mass_on_plates(
     """
     options = unit.config.ingest
     height_m = unit.person.height_m if stated is None else None
-    told = told_mass({unit.name: stretches}, options.mass_half_width_percent, height_m)
-    if stated is not None and not told.is_known:
-        told = told_mass({unit.name: stretches}, VAGUE_PERCENT)
-    comparison = compared(unit, stated, told, unit.load_kg())
-    about = [mass_finding(told, comparison, stated.source if stated else "")]
+    measured = told_mass({unit.name: intervals}, options.mass_half_width_percent, height_m)
+    if stated is not None and not measured.is_known:
+        measured = told_mass({unit.name: intervals}, VAGUE_PERCENT)
+    comparison = compared(unit, stated, measured, unit.load_kg())
+    about = [mass_finding(measured, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)
-    told_kg = told.mass_kg if told.is_known else None
+    measured_kg = measured.mass_kg if measured.is_known else None
     if from_plates:
-        return told_kg, told_kg, about
+        return measured_kg, measured_kg, about
     assert stated is not None
-    return stated.mass_kg + unit.load_kg(), told_kg, about
+    return stated.mass_kg + unit.load_kg(), measured_kg, about
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:

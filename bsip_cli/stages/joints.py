@@ -42,7 +42,13 @@ from bsip_cli.stages.frames import (
     person_of,
 )
 from bsip_cli.stages.reconstruct import parameters_of
-from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
+from bsip_cli.stages.trial_scene import (
+    body_as_sized,
+    causes_of,
+    outline,
+    plate_names,
+    scene_of,
+)
 from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
@@ -61,7 +67,7 @@ def run(unit: Unit) -> None:
     spread = _spreads(unit, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
-    left_out = _tell(unit, trial, reasons)
+    left_out = _report(unit, trial, reasons)
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
@@ -175,9 +181,9 @@ def _reasons(unit: Unit, trial: _Trial, feet: FootForces) -> Reasons:
     found = {_NO_POSE: np.tile(~trial.determined[:, None], joints)}
     unseen = person.without_data()[1:]
     found["no markers show how the segment moves"] = np.tile(unseen, (count, 1))
-    beside = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
+    off_plate = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
     if trial.readings:
-        found[_HELD] = np.tile((~trial.measured & ~beside)[:, None], joints)
+        found[_HELD] = np.tile((~trial.measured & ~off_plate)[:, None], joints)
     for side in SIDES:
         legs = [i - 1 for i in person.skeleton.way(f"foot_{side}")]
         for words, frames in feet.unknown[side].items():
@@ -202,7 +208,7 @@ def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
             yield cause.target, np.abs(trial.times_s - middle) <= length / 2
 
 
-def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
+def _report(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
     """Say what is left out, in one sentence: joints of one reason and number of frames together.
 
     Returns, by joint, what left frames out, in words; empty where nothing did.
@@ -266,10 +272,10 @@ def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.nd
     of_pelvis = np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3
     each = of_accelerations(person, trial.q[some], phi, covariance / of_pelvis[:, None, None])
     near = np.clip(np.arange(shape[0]), some[0], some[-1])
-    course = np.stack(each)
+    signal = np.stack(each)
     if len(some) > 1:
-        course = interp1d(some, course, axis=1)(near)
-    force, moment = course * trial.pelvis_noise[:, None, None]
+        signal = interp1d(some, signal, axis=1)(near)
+    force, moment = signal * trial.pelvis_noise[:, None, None]
     return force, moment
 
 
@@ -282,7 +288,7 @@ def _extended(
     """Method, loads and valid frames (N, J) of the extended models of this trial.
 
     Forces freed of the errors of plates and clock, axes of their tilts; parameters as ``extend``
-    found them; what a segment carries besides, as a ball in a hand, loads the joints on its way to
+    found them; what else a segment carries, as a ball in a hand, loads the joints on its way to
     the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
     joints or single markers would need another motion: no model with one of them is computed.
     """
@@ -292,7 +298,7 @@ def _extended(
         return
     person = trial.person
     names, phi = parameters_of(pd.concat([bsip, extended]), person)
-    scene = scene_of(unit, person, body_beside(unit, phi[:, names.index(RM)]))
+    scene = scene_of(unit, person, body_as_sized(unit, phi[:, names.index(RM)]))
     known = load_phi(unit, person)
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
@@ -314,7 +320,7 @@ def _extended(
         freed = [replace(one, wrench=corrected.get(name, one.wrench)) for one, name in pairs]
         feet, on_feet = trial.ground(freed)
         q, upright = in_true_axes(trial.q, on_feet, among)
-        touched = besides(replace(scene, q=q), upright, among)
+        touched = other_loads(replace(scene, q=q), upright, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
         loads = replace(trial, q=q).loads(body[:, None], touched, of_om)
         reasons = _reasons(unit, trial, feet)
@@ -354,7 +360,7 @@ def in_true_axes(
     return q, on_feet
 
 
-def besides(
+def other_loads(
     scene: Scene, on_feet: Mapping[str, Ground], causes: Sequence[Cause]
 ) -> dict[str, Ground]:
     """What acts on each segment: the ground, less what the causes at a segment need."""
@@ -403,9 +409,9 @@ def _table(
     return pd.DataFrame(times | words | columns, copy=False)
 
 
-def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray:
-    """Courses (N, ...), each inside its own valid frames; NaN outside."""
-    flat, good = courses.reshape(len(courses), -1), ok.reshape(len(ok), -1)
+def _lowpassed(trial: _Trial, signals: np.ndarray, ok: np.ndarray) -> np.ndarray:
+    """Signals (N, ...), each inside its own valid frames; NaN outside."""
+    flat, good = signals.reshape(len(signals), -1), ok.reshape(len(ok), -1)
     found = np.full(flat.shape, np.nan)
     packed = np.packbits(good, axis=0)
     _, first, alike = np.unique(packed, axis=1, return_index=True, return_inverse=True)
@@ -413,7 +419,7 @@ def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray
         pattern, mine = good[:, column], np.flatnonzero(alike.ravel() == number)
         operator, frames = lowpass_operator(pattern, trial.rate_hz, trial.cutoff_hz)
         found[np.ix_(frames, mine)] = operator @ np.where(pattern[:, None], flat[:, mine], 0.0)
-    return found.reshape(courses.shape)
+    return found.reshape(signals.shape)
 
 
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:

@@ -1,10 +1,11 @@
 """What a person's diagnosis knows of plates, clock and vertical from the others recorded there, and
-the tables in which persons and laboratories tell it."""
+the tables that hold what persons and laboratories show."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -20,10 +21,11 @@ from bsip_cli.diagnosis.shared_faults import (
     with_known,
 )
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.effect import Parameter, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record
+from bsip_cli.statistics.samples import Z95
 
 _KEY = ("effect", "target", "parameter", "standing")
 _ROUNDING = 1e-10  # of the largest variance
@@ -33,14 +35,16 @@ _FAULTS = {one.name for one in OF_A_LABORATORY}
 @dataclass(frozen=True, eq=False)
 class Known:
     """coordinates (C,), mean (C,) and root (C, C) of the covariance of the sizes [typical] by all
-    other persons; rows : of the ``laboratory`` table, by all."""
+    other persons; rows : of the ``laboratory`` table, by all; own : size and standard deviation
+    [typical] of each by this person's recordings in motion alone."""
 
     coordinates: tuple[Coordinate, ...]
     mean: np.ndarray
     root: np.ndarray
     rows: pd.DataFrame
+    own: Mapping[Coordinate, tuple[float, float]]
 
-    def beside(self, trial: FaultTrial, standing: bool) -> FaultTrial:
+    def given_to(self, trial: FaultTrial, standing: bool) -> FaultTrial:
         return with_known(trial, standing, self.coordinates, self.mean, self.root)
 
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
@@ -54,6 +58,7 @@ class Known:
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
                 words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
                 known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
+                known += self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
                 yield Finding(
                     effect.name,
                     str(target),
@@ -65,9 +70,38 @@ class Known:
                     scope="laboratory",
                 )
 
+    def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> str:
+        """Whether this person's recordings show a fault too, by its largest number; empty where
+        they say nothing of it."""
+        sizes = dict(zip(rows["parameter"], rows["estimate"], strict=True))
+        first = rows.iloc[0]
+        known = [
+            (abs(sizes[p.name]) / p.typical, p, self.own[at])
+            for p in parameters
+            if (at := Coordinate(first["effect"], first["target"], p.name)) in self.own
+        ]
+        if not known:
+            return ""
+        _, parameter, (mean, sd) = max(known, key=itemgetter(0))
+        low, high = mean - Z95 * sd, mean + Z95 * sd
+        how = (
+            "also show it"
+            if low * high > 0 and mean * sizes[parameter.name] > 0
+            else "leave it open"
+        )
+        factor, unit = readable_unit(parameter.name, parameter.unit)
+        ends = [factor * parameter.typical * x for x in (mean, low, high)]
+        digits = digits_of(ends[2] - ends[1])
+        size, least, most = (f"{x:.{digits}f}" for x in ends)
+        shown = with_unit(size, unit)
+        return (
+            f", and this person's recordings alone {how}: {shown}, 95 % interval "
+            f"{with_unit(f'{least} to {most}', unit)}"
+        )
+
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
-        and the clock as the others alone tell them, who have no other fault."""
+        and the clock as the others alone show them, who have no other fault."""
         sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))
         for found in self.findings(trials):
             parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
@@ -129,8 +163,8 @@ def known_laboratory(unit: Unit) -> Known | None:
         return None  # of several laboratories, or alone
     (number,) = persons
     pooled = unit.read("laboratory-sums", laboratory=[number])
-    told = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
-    posterior = pooled_in(pooled).without(told).posterior()
+    sessions = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
+    posterior = pooled_in(pooled).without(sessions).posterior()
     at = [k for k, one in enumerate(pooled_in(pooled).coordinates) if one.effect in _FAULTS]
     table = unit.read("laboratory", laboratory=[number], scope=["laboratory"])
     covariance = posterior.covariance[np.ix_(at, at)]
@@ -140,7 +174,28 @@ def known_laboratory(unit: Unit) -> Known | None:
         posterior.mean[at],
         vectors * np.sqrt(np.maximum(values, 0.0)),
         table,
+        alone(sessions),
     )
+
+
+def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
+    """Size and standard deviation of what a person's sessions say in motion, each as large as
+    usual before the data; where the data say nothing there is none."""
+    parameters = {
+        x: p for one in sessions for x, p in zip(one.coordinates, one.parameters, strict=True)
+    }
+    known = sorted(x for x in parameters if not x.standing)
+    precision, pull = np.eye(len(known)), np.zeros(len(known))
+    for one in sessions:
+        mine = [k for k, x in enumerate(one.coordinates) if not x.standing]
+        at = [known.index(one.coordinates[k]) for k in mine]
+        precision[np.ix_(at, at)] += one.precision[np.ix_(mine, mine)]
+        pull[at] += one.pull[mine]
+    covariance = np.linalg.inv(precision)
+    model = np.array([parameters[x].known_to / parameters[x].typical for x in known])
+    sd = np.sqrt(np.diagonal(covariance) + model**2)
+    sizes = zip(known, covariance @ pull, sd, np.diagonal(precision) > 1.0, strict=True)
+    return {one: (float(mean), float(s)) for one, mean, s, is_there in sizes if is_there}
 
 
 # --- tables ---------------------------------------------------------------------------------------

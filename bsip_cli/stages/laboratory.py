@@ -1,7 +1,7 @@
 """laboratory (cohort): the faults of plates, clock and vertical by all persons together.
 
 Reads laboratory-information of all who have it, one after the other. Writes laboratory, and
-laboratory-sums, by which each person's diagnosis knows what the others tell.
+laboratory-sums, by which each person's diagnosis knows what the others show.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ class _Session:
     """One session of a person.
 
     plates : corners (4, 3) in the world by name. moments_s : mean and standard deviation of those
-    that tell of the clock.
+    that show the clock.
     """
 
     name: str
     person: str
-    told: Information
+    information: Information
     mass_sd: float
     plates: Mapping[str, np.ndarray]
     moments_s: tuple[float, float]
@@ -166,7 +166,7 @@ def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
     mine = unit.config.laboratory
     mean_s, sd_s = np.mean([one.moments_s for one in sessions], axis=0).tolist()
     persons = persons_of(
-        [one.told for one in sessions],
+        [one.information for one in sessions],
         [one.mass_sd for one in sessions],
         mine.between_persons,
         mine.alike,
@@ -208,7 +208,7 @@ def _rows(
 def _rows_of(
     found: Verdict | Deviation, counts: tuple[int, int], cells: Mapping[str, str]
 ) -> Iterator[dict]:
-    """One for each number of a cause; counts : persons and trials that tell of it."""
+    """One for each number of a cause; counts : persons and trials that show it."""
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
     for x in found.sizes:
@@ -225,12 +225,12 @@ def _row(key: tuple[str, str, str], **cells: object) -> dict:
 
 
 def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
-    """Persons and trials that tell of a cause at its plate, or at any for all plates."""
+    """Persons and trials that show a cause at its plate, or at any for all plates."""
     plate, *channel = cause.target.split(" ")
     persons, trials = set(), 0
     for one in sessions:
         counts: dict[bool, int] = {}  # in motion, and of who stands still
-        for c, count in zip(one.told.coordinates, one.told.trials, strict=True):
+        for c, count in zip(one.information.coordinates, one.information.trials, strict=True):
             mine = c.effect == cause.effect and c.target.split(" ")[1:] == channel
             if mine and plate in (ALL, c.target.split(" ")[0]):
                 counts[c.standing] = max(counts.get(c.standing, 0), int(count))
@@ -263,18 +263,18 @@ def _sentence(
         f"{n} {word}{'s' * (n != 1)}"
         for n, word in zip(counts, ("person", "recording"), strict=True)
     )
-    told = f"by {people} and {recordings}"
+    shown = f"by {people} and {recordings}"
     if said == "named":
-        return f"{words}, {told}; to make sure, {remedy}"
+        return f"{words}, {shown}; to make sure, {remedy}"
     if said == "ambiguous":
-        return f"perhaps {words}, {told}; other causes look alike here: {remedy}"
+        return f"perhaps {words}, {shown}; other causes look alike here: {remedy}"
     if said == "inconclusive":
-        return f"cannot tell: {words}; no possible size would have been named {told}"
+        return f"inconclusive: {words}; no possible size would have been named {shown}"
     best = min(sizes, key=lambda one: one.limit / one.parameter.typical)
     factor, unit = readable_unit(best.parameter.name, best.parameter.unit)
     limit = with_unit(f"{factor * best.limit:.{digits_of(factor * best.limit)}f}", unit)
     start = "not so" if probability < 0.5 else "not sure"
     return (
         f"{start}: {words}, probability {probability:.2g}; "
-        f"{best.parameter.name.replace('_', ' ')} {limit} would have been named {told}"
+        f"{best.parameter.name.replace('_', ' ')} {limit} would have been named {shown}"
     )

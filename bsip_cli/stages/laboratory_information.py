@@ -1,4 +1,4 @@
-"""laboratory (participant): what a person's sessions tell of plates, clock and vertical."""
+"""laboratory (participant): what a person's sessions show of plates, clock and vertical."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ def run(unit: Unit) -> None:
     rows, sessions = [], {}
     for session, mine in seen.items():
         found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
-        told = [one for one in found if one is not None and one.held is None]
-        if any(one.moves for one in told):
-            scenes = [one.scene for one in told if one.moves]
+        usable = [one for one in found if one is not None and one.held is None]
+        if any(one.moves for one in usable):
+            scenes = [one.scene for one in usable if one.moves]
             moments = np.concatenate([one.times_s[one.valid] - one.times_s[0] for one in scenes])
-            trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in told]
+            trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in usable]
             rows += _rows(session, information_of(trials))
             sessions[session] = {
                 "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
-                "trials": [one.trial.stem for one in told],
-                # mean and standard deviation of those that tell of the clock, from each start
+                "trials": [one.trial.stem for one in usable],
+                # mean and standard deviation of those that show the clock, from each start
                 "moments_s": [float(moments.mean()), float(moments.std())],
             }
     if not sessions:
         unit.warn(
-            f"{unit.name}: no trial has motion with every contact on a plate; it tells nothing of "
+            f"{unit.name}: no trial has motion with every contact on a plate; it shows nothing of "
             "the laboratory"
         )
     facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
@@ -55,16 +55,16 @@ def run(unit: Unit) -> None:
     unit.write("laboratory-information", pd.DataFrame(rows, columns=columns), facts)
 
 
-def _rows(session: str, told: Information) -> list[dict]:
-    numbers = zip(told.coordinates, told.parameters, told.trials, strict=True)
+def _rows(session: str, information: Information) -> list[dict]:
+    numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
     return [
         {
             "session": session,
             **vars(one),
             **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
             "trials": int(trials),
-            "pull": told.pull[k],
-            **{f"precision_{j}": x for j, x in enumerate(told.precision[k])},
+            "pull": information.pull[k],
+            **{f"precision_{j}": x for j, x in enumerate(information.precision[k])},
         }
         for k, (one, parameter, trials) in enumerate(numbers)
     ]

@@ -46,63 +46,63 @@ def stated_mass(unit: Unit, *facts: dict) -> StatedMass | None:
 def compared(
     unit: Unit,
     stated: StatedMass | None,
-    told: ToldMass,
+    measured: ToldMass,
     load_kg: float,
     height_m: float | None = None,
 ) -> Comparison | None:
     """The stated mass with ``load_kg`` against the plates; None without either."""
-    if stated is None or not told.is_known:
+    if stated is None or not measured.is_known:
         return None
     options, height_m = unit.config.ingest, height_m or unit.person.height_m
     limits = options.mass_tolerance_percent, options.mass_gross_percent
-    return Comparison(stated.mass_kg, load_kg, told, *limits, height_m)
+    return Comparison(stated.mass_kg, load_kg, measured, *limits, height_m)
 
 
 def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
-    """From what is stated and the stretches that ingest found in these trials; warns."""
-    stretches = {}
+    """From what is stated and the intervals that ingest found in these trials; warns."""
+    intervals = {}
     for trial in trials:
         records = map(Stretch.of, unit.facts("wrench", trial)["mass_stretches"])
-        stretches[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
+        intervals[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
     static = {trial.stem for trial in trials if trial.role == "static"}
-    told = told_mass(stretches, unit.config.ingest.mass_half_width_percent, height_m, static)
+    measured = told_mass(intervals, unit.config.ingest.mass_half_width_percent, height_m, static)
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""
-    if stated is None and told.is_known:
-        unit.say(f"mass taken from the plates{without}: {told.words()}")
-        return PersonMass(told.mass_kg, PLATES, told.mass_kg, "")
+    if stated is None and measured.is_known:
+        unit.say(f"mass taken from the plates{without}: {measured.words()}")
+        return PersonMass(measured.mass_kg, PLATES, measured.mass_kg, "")
     if stated is None:
-        note = f"mass is not known: put mass_kg into participants.tsv, because {told.reason}"
+        note = f"mass is not known: put mass_kg into participants.tsv, because {measured.reason}"
         unit.say(note)
         return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
-    vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, static=static)
+    vague = measured if measured.is_known else told_mass(intervals, VAGUE_PERCENT, static=static)
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
         unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")
     if comparison is None:
-        return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
+        return PersonMass(stated.mass_kg, stated.source, measured.mass_kg, "")
     if comparison.is_gross:
-        return _gross(unit, stated, comparison, told.is_known)
-    if told.is_known and not comparison.is_small:
+        return _gross(unit, stated, comparison, measured.is_known)
+    if measured.is_known and not comparison.is_small:
         unit.say(
-            f"the plates tell {told.words()}{without}, stated are "
+            f"the plates measure {measured.words()}{without}, stated are "
             f"{stated.mass_kg:.2f} kg ({comparison.difference_percent:+.1f} %, tolerance "
             f"{comparison.tolerance_percent:g} %)"
         )
-    return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
+    return PersonMass(stated.mass_kg, stated.source, measured.mass_kg, "")
 
 
 def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
     """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
     none; else nothing is known to be wrong with either, and the stated one stays."""
-    told = comparison.told
-    plates_kg = told.mass_kg if is_sure else float("nan")
+    measured = comparison.told
+    plates_kg = measured.mass_kg if is_sure else float("nan")
     sentence = comparison.sentence(stated.source)
     if not comparison.likely():
         used, source = stated.mass_kg, stated.source
     elif is_sure:
-        used, source = told.mass_kg, PLATES
+        used, source = measured.mass_kg, PLATES
     else:
         used, source = float("nan"), UNKNOWN
     what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"

@@ -1,4 +1,4 @@
-"""reconstruct: ground wrench and COP from motion and inertia, beside the measured ones.
+"""reconstruct: ground wrench and COP from motion and inertia, next to the measured ones.
 
 What extend shares: a trial's wrenches filtered, judged and tabulated alike.
 """
@@ -17,7 +17,7 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
-from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
+from bsip_cli.dynamics.lowpass import lowpass_operator, valid_intervals
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
@@ -49,7 +49,10 @@ def run(unit: Unit) -> None:
     compared = over_the_same_frames(signals)
     unit.write("fit", fit_rows(judgement, compared))
     unit.write("correlation-difference", _correlations(compared, judgement.judged))
-    rate, spans = 1.0 / float(np.median(np.diff(judgement.times_s))), stretches(judgement.judged)
+    rate, spans = (
+        1.0 / float(np.median(np.diff(judgement.times_s))),
+        valid_intervals(judgement.judged),
+    )
     sway = [
         {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
         for name, one in compared.items()
@@ -79,7 +82,7 @@ class Judgement:
     times_s : (N,). valid : (N,) frames with every contact on a plate and a determined pose.
     used : (N,) frames that helped to identify. judged : (N,) frames that count.
     data : held_out, or identification where no other data are left.
-    operator, frames : low-pass inside the valid stretches, and the frame of each output.
+    operator, frames : low-pass inside the valid intervals, and the frame of each output.
     """
 
     times_s: np.ndarray
@@ -95,7 +98,7 @@ class Judgement:
     min_force_N: float
 
     def compared(self, wrenches: Wrenches) -> tuple[Wrenches, Signals]:
-        """Low-passed inside the valid stretches, as they were outside; all judged components."""
+        """Low-passed inside the valid intervals, as they were outside; all judged components."""
         smooth, signals = {}, {}
         for name, wrench in wrenches.items():
             smooth[name] = wrench.copy()
@@ -180,7 +183,7 @@ def scale_of(component: str) -> tuple[float, str]:
 
 def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
     """Rows of ``fit``: every method of ``signals`` against the measured one."""
-    rows, spans = [], stretches(judgement.judged)
+    rows, spans = [], valid_intervals(judgement.judged)
     for method, computed in signals.items():
         for component, values in computed.items() if method != MEASURED else ():
             scale, unit = scale_of(component)
@@ -205,7 +208,7 @@ def gain_rows(errors: dict[str, BlockErrors], method: str, data: str, seed: int)
 def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
     rows = []
     methods = [name for name in signals if name != MEASURED]
-    spans = stretches(judged)
+    spans = valid_intervals(judged)
     for a, b in combinations(methods, 2):
         for component in signals[MEASURED]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))

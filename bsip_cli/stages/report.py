@@ -127,5 +127,5 @@ def origin_of(path: Path, label: str) -> Origin:
     provenance = read_header(path)["provenance"]
     made_by = provenance["made_by"]
     known = ("stage", "bsip_version", "libraries", "options", "inputs")
-    told = {name: made_by[name] for name in known}
-    return Origin(label, messages=tuple(provenance["messages"]), **told)
+    made = {name: made_by[name] for name in known}
+    return Origin(label, messages=tuple(provenance["messages"]), **made)

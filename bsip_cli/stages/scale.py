@@ -86,8 +86,8 @@ def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
 
 def _height_note(recorded: list[_Recorded], stated_m: float | None) -> str:
     """Empty, or how the markers' height differs from the stated one, which ingest has said."""
-    told = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
-    fault = told.against(stated_m) if told is not None and stated_m is not None else None
+    statures = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
+    fault = statures.against(stated_m) if statures is not None and stated_m is not None else None
     return "; ".join((fault[0], fault[2])) if fault else ""
 
 

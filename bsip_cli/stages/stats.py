@@ -1,5 +1,5 @@
 """Cohort: every participant's numbers in one tidy table, the tests between the methods, and of both
-the papers' six tables with the published values beside them, as CSV, Markdown and LaTeX."""
+the papers' six tables with the published values next to them, as CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class _Cohort:
         BadDataError: nobody has any.
         """
         for name, why in self._unit.left_out.items():
-            self._lacks(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6, is_told=True)
+            self._lacks(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6, is_reported=True)
         waiting: list[Value] = []
         for participant in self._unit.study.participants:
             waiting += self._values_of(participant)
@@ -129,12 +129,12 @@ class _Cohort:
             self._fitted[place]["everyone"] += 1
         return values
 
-    def _lacks(self, what: str, *numbers: int, is_told: bool = False) -> None:
-        """`what` ("sub-02 has no ...") is not in the tables with these numbers: the user is told,
+    def _lacks(self, what: str, *numbers: int, is_reported: bool = False) -> None:
+        """`what` ("sub-02 has no ...") is not in the tables with these numbers: a message says it,
         unless that is done."""
         *others, last = map(str, numbers)
         tables = f"tables {', '.join(others)} and {last}" if others else f"table {last}"
-        if not is_told:
+        if not is_reported:
             self._unit.warn(f"{what}: not in {tables}")
         self._missing.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
 
@@ -281,10 +281,13 @@ def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
 
 def run_tables(unit: Unit) -> None:
     options, facts = unit.config.stats, unit.facts("values")
-    criteria, told = Criteria(options.alpha, options.equivalence_percent), unit.read("comparisons")
+    criteria, compared = (
+        Criteria(options.alpha, options.equivalence_percent),
+        unit.read("comparisons"),
+    )
     files = [
         write_bytes(folder(unit.out) / f"{table.name}.{ending}", render(table).encode())
-        for table in build_tables(told, criteria, facts["fitted_on"], facts["missing"])
+        for table in build_tables(compared, criteria, facts["fitted_on"], facts["missing"])
         for ending, render in RENDERERS.items()
     ]
     unit.write("tables-files", file_rows(unit.out, files))

@@ -18,7 +18,7 @@ from bsip_cli.study.study import Trial
 
 _NAMED = ("named", "ambiguous")
 _LOADED_N = 20.0
-_HALF_M = 0.3  # of a plate whose outline no file tells
+_HALF_M = 0.3  # of a plate whose outline no file states
 
 
 def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None) -> Scene:
@@ -28,7 +28,7 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     """
     times, labels, positions = markers_from(unit.read("markers", trial))
     markers = ordered_markers(labels, positions, person.markers)
-    markers = with_labels_put_right(
+    markers = with_labels_corrected(
         markers, times, person.markers, unit.read("marker-events", trial)
     )
     scene = motion_and_wrench_of(unit, person, phi, trial)
@@ -56,7 +56,7 @@ def motion_and_wrench_of(
     )
 
 
-def with_labels_put_right(
+def with_labels_corrected(
     markers_m: np.ndarray, times_s: np.ndarray, names: tuple[str, ...], events: pd.DataFrame
 ) -> np.ndarray:
     """(N, m, 3) markers with labels exchanged back where ``ik`` did so (``marker-events``)."""
@@ -116,13 +116,13 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
     return tuple(Cause(*key, *both) for key, both in zip(keys, sizes, strict=True))
 
 
-def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:
+def body_as_sized(unit: Unit, phi: np.ndarray) -> np.ndarray:
     """(10 n,) the body for which the causes were sized: RM's (10 n,), made as heavy as the
     plates read where the diagnosis believes them instead of the stated mass."""
     return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])
 
 
 def blocks_of(unit: Unit, stem: str) -> Blocks:
-    """How the diagnosis cut a trial that it looked at."""
+    """How the diagnosis cut a trial that it analysed."""
     facts = unit.facts("overall-diagnosis")
     return Blocks(**facts["blocks"][stem], block_s=facts["block_s"], folds=facts["folds"])

@@ -27,7 +27,7 @@ from bsip_cli.statistics.hypothesis_tests import (
     wilcoxon,
     williams_t,
 )
-from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
+from bsip_cli.statistics.methods import ALTERNATIVES, MEASURED, OM, RM
 from bsip_cli.statistics.samples import (
     TestResult,
     adjusted_p_values,
@@ -69,7 +69,7 @@ class Comparison(TestResult):
         return cls(topic, **{name: row[name] for name in row if name not in of_topic})
 
 
-def joined(*reasons: str) -> str:
+def all_reasons(*reasons: str) -> str:
     """Every reason once, in order."""
     return " ".join(dict.fromkeys(filter(None, reasons)))
 
@@ -182,33 +182,33 @@ class Criteria:
     equivalence_percent: float
 
 
-# --- OM against a rival over the participants: the published t test, and what stands beside it ----
+# --- OM against another method over the participants: the published t test, and what it lacks -----
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """(participants,) values x of OM and y of a rival, in the topic's unit.
+    """(participants,) values x of OM and y of another method, in the topic's unit.
 
-    ``origin`` : of the tests that the papers make of OM and RM; with another rival they are added.
+    ``origin`` : of the tests that the papers make of OM and RM; with other methods they are added.
     """
 
     topic: Topic
-    rival: str
+    other: str
     x: Sample
     y: Sample
     origin: Origin
 
     def row(self, test: str, origin: Origin, result: TestResult, **more: Any) -> Comparison:
-        return Comparison(self.topic, test, origin, OM, self.rival, **(vars(result) | more))
+        return Comparison(self.topic, test, origin, OM, self.other, **(vars(result) | more))
 
 
 def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[Pair]:
-    """OM with RM, and with each other rival of which there are values."""
+    """OM with RM, and with each other method of which there are values."""
     known = {value.method for value in values}
-    for rival in RIVALS:
-        if rival == RM or rival in known:
-            x, y = per_participant(values, (OM, rival)).T
-            yield Pair(topic, rival, x, y, origin if rival == RM else "added")
+    for other in ALTERNATIVES:
+        if other == RM or other in known:
+            x, y = per_participant(values, (OM, other)).T
+            yield Pair(topic, other, x, y, origin if other == RM else "added")
 
 
 def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
@@ -219,7 +219,7 @@ def description(topic: Topic, method: str, values: Sequence[Value]) -> Compariso
 
 
 def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
-    """Paired t test with Cohen's d as printed; beside it d_z, and Wilcoxon's test."""
+    """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
     normality = lilliefors_test(np.subtract(*finite_pairs(pair.x, pair.y)))
     by_t = pair.row(
@@ -227,7 +227,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
         pair.origin,
         test,
         effect_size=cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b),
-        effect_size_name=f"Cohen's d (pooled SD, {pair.rival} - OM)",
+        effect_size_name=f"Cohen's d (pooled SD, {pair.other} - OM)",
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
@@ -240,8 +240,8 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
 
 def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
     """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    rival = mean_of(finite_pairs(pair.x, pair.y)[1])
-    bound = abs(rival) * criteria.equivalence_percent / 100.0
+    other = mean_of(finite_pairs(pair.x, pair.y)[1])
+    bound = abs(other) * criteria.equivalence_percent / 100.0
     return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
 
 
@@ -254,7 +254,7 @@ def smaller_error(pair: Pair) -> Comparison:
 # --- measured, OM and RM side by side: the published ANOVA of three groups, and the one for them --
 
 
-def methods_beside_each_other(
+def methods_compared(
     topic: Topic, table: NDArray[np.float64], methods: Sequence[str], alpha: float
 ) -> Iterator[Comparison]:
     """Both ANOVAs with their Bonferroni post hoc tests, over the participants with all methods.
@@ -268,12 +268,12 @@ def methods_beside_each_other(
     of_each = [lilliefors_test(column) for column in table.T]
     pairs = combinations(range(len(methods)), 2)
     differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
-    why = joined(*(test.reason for test in of_each))
+    why = all_reasons(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
-    apart, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
+    between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
     of_pairs = list(differences.values())
     cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
-        ("one_way_anova", "t", "published", apart, normality, why),
+        ("one_way_anova", "t", "published", between, normality, why),
         ("repeated_measures_anova", "paired_t", "added", within, of_pairs, ""),
     )
     for name, after, origin, (test, post_hoc), normal, doubt in cases:
@@ -325,12 +325,12 @@ def _tests_of_topic(
     if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
         methods = (MEASURED, OM, RM)
         columns = per_participant(values, methods)
-        yield from methods_beside_each_other(topic, columns, methods, alpha)
+        yield from methods_compared(topic, columns, methods, alpha)
     for pair in pairs_of(topic, values, "published" if is_published else "added"):
         if only_described:  # means and SDs
             means = described_pair(*finite_pairs(pair.x, pair.y))
             yield pair.row("description", pair.origin, means)
-        elif table != "table3" or pair.rival != RM:
+        elif table != "table3" or pair.other != RM:
             yield from t_and_rank_tests(pair, alpha)
             if table == "table1":
                 yield equivalence(pair, criteria)

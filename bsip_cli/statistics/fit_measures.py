@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from bsip_cli.statistics.samples import (
-    Stretches,
+    Intervals,
+    concatenated,
     effective_samples_of_pair,
-    finite_stretches,
+    finite_intervals,
     is_constant,
-    joined,
 )
 
 ELLIPSE_SHARE = 0.95
@@ -44,10 +44,10 @@ class FitMeasures:
 def fit_measures(
     measured: ArrayLike,
     computed: ArrayLike,
-    stretches: Stretches | None = None,
+    intervals: Intervals | None = None,
     body_weight_N: float | None = None,
 ) -> FitMeasures:
-    """RMSE, Pearson's r and the Sprague-Geers metric of two signals over the given stretches.
+    """RMSE, Pearson's r and the Sprague-Geers metric of two signals over the given intervals.
 
     With theta_ab the mean of a b: M = sqrt(theta_cc / theta_mm) - 1, P = arccos(theta_mc /
     sqrt(theta_mm theta_cc)) / pi, C = sqrt(M^2 + P^2) (Sprague and Geers, as in Schwer 2007,
@@ -56,13 +56,13 @@ def fit_measures(
     the phase.
 
     measured, computed : shape (n,), one unit. Rows in which either is not finite are left out.
-    stretches : half-open index pairs of the samples to compare, None for all.
+    intervals : half-open index pairs of the samples to compare, None for all.
     body_weight_N : mass times g; None if the signals are no forces.
-    ValueError: if the shapes differ or the stretches do not fit them.
+    ValueError: if the shapes differ or the intervals do not fit them.
     """
     measured, computed = np.asarray(measured, dtype=float), np.asarray(computed, dtype=float)
-    parts = finite_stretches(stretches, measured, computed)
-    m, c = joined(measured, parts), joined(computed, parts)
+    parts = finite_intervals(intervals, measured, computed)
+    m, c = concatenated(measured, parts), concatenated(computed, parts)
     if len(m) == 0:
         return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
@@ -73,11 +73,11 @@ def fit_measures(
     return FitMeasures(rmse, percent, _pearson(m, c), *schwer, len(m), n_effective)
 
 
-def correlation(x: ArrayLike, y: ArrayLike, stretches: Stretches | None = None) -> float:
+def correlation(x: ArrayLike, y: ArrayLike, intervals: Intervals | None = None) -> float:
     """Pearson's r of two signals, as in `fit_measures`."""
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    parts = finite_stretches(stretches, first, second)
-    return _pearson(joined(first, parts), joined(second, parts))
+    parts = finite_intervals(intervals, first, second)
+    return _pearson(concatenated(first, parts), concatenated(second, parts))
 
 
 def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
@@ -107,7 +107,7 @@ class Posturography:
     rms_*_mm : root mean square about the mean, the usual definition of sway.
     rms_*_origin_m : about the origin of the coordinates, which only shows where the person
         stood; it is here because the printed values of Hansen 2017 fit it.
-    duration_s : time between first and last sample, summed over the stretches.
+    duration_s : time between first and last sample, summed over the intervals.
     """
 
     rms_ap_mm: float = nan
@@ -122,11 +122,11 @@ class Posturography:
 
 
 def posturography(
-    cop_ap_m: ArrayLike, cop_ml_m: ArrayLike, rate_hz: float, stretches: Stretches | None = None
+    cop_ap_m: ArrayLike, cop_ml_m: ArrayLike, rate_hz: float, intervals: Intervals | None = None
 ) -> Posturography:
     """RMS, mean velocity, path length and 95 % ellipse area of a centre of pressure.
 
-    Path and time are summed within contiguous stretches only: no step across a gap. Mean
+    Path and time are summed within contiguous intervals only: no step across a gap. Mean
     velocity = path / time. The ellipse is the prediction ellipse, within which 95 % of a normal
     distribution of points lies: pi chi2_{2, 0.95} sqrt(det S), S the covariance with n - 1
     (Schubert and Kirchner 2014, Ellipse area calculations and their applicability in
@@ -135,14 +135,14 @@ def posturography(
 
     cop_ap_m, cop_ml_m : shape (n,), in m. Samples in which either is not finite are gaps.
     rate_hz : samples per second.
-    stretches : half-open index pairs of the samples to use, None for all.
-    ValueError: if rate_hz is not positive, the shapes differ or the stretches do not fit them.
+    intervals : half-open index pairs of the samples to use, None for all.
+    ValueError: if rate_hz is not positive, the shapes differ or the intervals do not fit them.
     """
     if not rate_hz > 0.0:
         raise ValueError(f"rate_hz must be positive, not {rate_hz}")
     ap, ml = np.asarray(cop_ap_m, dtype=float), np.asarray(cop_ml_m, dtype=float)
-    parts = finite_stretches(stretches, ap, ml)
-    path = np.stack([joined(ap, parts), joined(ml, parts)])
+    parts = finite_intervals(intervals, ap, ml)
+    path = np.stack([concatenated(ap, parts), concatenated(ml, parts)])
     n = path.shape[1]
     if n == 0:
         return Posturography()

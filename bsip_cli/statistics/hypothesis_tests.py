@@ -161,7 +161,7 @@ def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.
 
 
 def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
-    """In how many participants each value is the smaller, and whether that is chance (exact)."""
+    """In how many participants each value is the smaller, with an exact p-value."""
     x, y = finite_pairs(x, y)
     own, other = int(np.sum(x < y)), int(np.sum(y < x))
     share = own / len(x) if len(x) else nan
@@ -177,7 +177,7 @@ def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
 def _why_no_t(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
     if len(x) < MINIMUM_PAIRS:
         return f"A paired t test needs {MINIMUM_PAIRS} pairs, there are {len(x)}."
-    if is_constant(x - y, beside=_magnitude(x, y)):
+    if is_constant(x - y, magnitude=_magnitude(x, y)):
         return "All differences are equal, so the t statistic has no finite value."
     return ""
 

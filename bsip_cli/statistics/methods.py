@@ -5,10 +5,10 @@ RM = "RM"  # the table's parameters
 RM_MASS = "RM+mass"  # RM, all masses and tensors times one number
 OM = "OM"  # identified
 
-RIVALS = (RM, RM_MASS)
+ALTERNATIVES = (RM, RM_MASS)
 """What OM is compared with: what one number for the whole mass does, identification did not."""
 
-METHODS = (*RIVALS, OM)
+METHODS = (*ALTERNATIVES, OM)
 
 SAME_WITHIN = 0.01  # errors that differ by less count as equal
 

@@ -82,7 +82,7 @@ def adjusted_p_values(
 
 
 def p_of_one_size(estimates: np.ndarray, widths: np.ndarray) -> float:
-    """Chance that estimates (n,) of one size spread like these (Cochran's Q).
+    """p-value of estimates (n,) of one size that spread like these (Cochran's Q).
 
     widths : (n,) of their 95 % intervals, above zero, in the estimates' unit.
     """
@@ -144,14 +144,14 @@ def finite_pairs(x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArr
     return first[both], second[both]
 
 
-def is_constant(values: NDArray[np.float64], *, beside: float = 0.0) -> bool:
+def is_constant(values: NDArray[np.float64], *, magnitude: float = 0.0) -> bool:
     """Whether the values vary by no more than rounding.
 
     values : shape (n,), n > 0.
-    beside : largest magnitude of what the values were computed from, in their unit; the
+    magnitude : largest magnitude of what the values were computed from, in their unit; the
         difference of two large numbers carries their rounding.
     """
-    scale = max(float(np.max(np.abs(values))), beside)
+    scale = max(float(np.max(np.abs(values))), magnitude)
     return float(np.ptp(values)) <= ROUNDING * scale
 
 
@@ -167,14 +167,14 @@ def mean_of(values: NDArray[np.float64]) -> float:
     return float(np.mean(values)) if len(values) else float("nan")
 
 
-# --- contiguous stretches of a sampled signal: half-open index pairs (start, stop) into it --------
+# --- contiguous intervals of a sampled signal: half-open index pairs (start, stop) into it --------
 
 
-Stretches = Sequence[tuple[int, int]]
+Intervals = Sequence[tuple[int, int]]
 """(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
 
 
-def stretches_of(valid: ArrayLike) -> list[tuple[int, int]]:
+def intervals_of(valid: ArrayLike) -> list[tuple[int, int]]:
     """The runs of True in a (n,) boolean array, in order."""
     flags = np.asarray(valid, dtype=bool)
     if flags.ndim != 1:
@@ -183,41 +183,41 @@ def stretches_of(valid: ArrayLike) -> list[tuple[int, int]]:
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
 
 
-def finite_stretches(
-    stretches: Stretches | None, *signals: NDArray[np.float64]
+def finite_intervals(
+    intervals: Intervals | None, *signals: NDArray[np.float64]
 ) -> list[tuple[int, int]]:
-    """The given stretches, split where any of the signals is not finite.
+    """The given intervals, split where any of the signals is not finite.
 
-    stretches : half-open index pairs, or None for the whole signals.
+    intervals : half-open index pairs, or None for the whole signals.
     signals : one or more arrays of the same shape (n,).
-    ValueError: if the signals differ in shape, or the stretches overlap, run backwards or leave the
+    ValueError: if the signals differ in shape, or the intervals overlap, run backwards or leave the
         signals: a mistake of the caller, not of the data.
     """
     n = len(signals[0])
     if any(signal.shape != (n,) for signal in signals):
         raise ValueError(f"signals must share one shape (n,): {[s.shape for s in signals]}")
-    ordered = sorted((int(start), int(stop)) for start, stop in stretches or [(0, n)])
-    if stretches is not None and len(stretches) == 0:
+    ordered = sorted((int(start), int(stop)) for start, stop in intervals or [(0, n)])
+    if intervals is not None and len(intervals) == 0:
         return []
     for start, stop in ordered:
         if not 0 <= start <= stop <= n:
-            raise ValueError(f"stretch ({start}, {stop}) does not lie within 0..{n}")
+            raise ValueError(f"interval ({start}, {stop}) does not lie within 0..{n}")
     for (_, stop), (start, _) in pairwise(ordered):
         if start < stop:
-            raise ValueError(f"stretches overlap at sample {start}")
+            raise ValueError(f"intervals overlap at sample {start}")
     finite = np.logical_and.reduce([np.isfinite(signal) for signal in signals])
     return [
         (start + first, start + last)
         for start, stop in ordered
-        for first, last in stretches_of(finite[start:stop])
+        for first, last in intervals_of(finite[start:stop])
     ]
 
 
-def joined(signal: NDArray[np.float64], stretches: Stretches) -> NDArray[np.float64]:
-    """The samples of all stretches, one after the other."""
-    if not stretches:
+def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[np.float64]:
+    """The samples of all intervals, one after the other."""
+    if not intervals:
         return signal[:0]
-    return np.concatenate([signal[start:stop] for start, stop in stretches])
+    return np.concatenate([signal[start:stop] for start, stop in intervals])
 
 
 # --- how many independent samples an autocorrelated series is worth -------------------------------
@@ -230,7 +230,7 @@ WINDOW_PER_TIME = 5.0
 """Lags summed, in integrated correlation times (Sokal 1997, section 3)."""
 
 
-def effective_samples(x: ArrayLike, stretches: Stretches | None = None) -> float:
+def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float:
     """Independent samples that would give the mean of x the same variance.
 
     n / (1 + 2 sum_k (N_k / n) rho_k), N_k the number of pairs of samples k apart, summed over
@@ -239,13 +239,13 @@ def effective_samples(x: ArrayLike, stretches: Stretches | None = None) -> float
     negative swing of an oscillating series, so it counts rather too few samples than too many.
 
     x : shape (n,), any unit. Samples that are not finite are gaps.
-    stretches : half-open index pairs to use, None for all. Positions count as time: pairs of
+    intervals : half-open index pairs to use, None for all. Positions count as time: pairs of
         samples across a gap enter at their true lag.
     Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     series = np.asarray(x, dtype=float)
-    parts = finite_stretches(stretches, series)
-    samples = joined(series, parts)
+    parts = finite_intervals(intervals, series)
+    samples = concatenated(series, parts)
     if len(samples) < MINIMUM_SAMPLES or is_constant(samples):
         return float("nan")
     products, _ = _lagged_products(series, parts)
@@ -258,7 +258,7 @@ def effective_samples(x: ArrayLike, stretches: Stretches | None = None) -> float
 
 
 def effective_samples_of_pair(
-    x: ArrayLike, y: ArrayLike, stretches: Stretches | None = None
+    x: ArrayLike, y: ArrayLike, intervals: Intervals | None = None
 ) -> float:
     """Independent pairs that would give the correlation of x and y the same variance.
 
@@ -269,13 +269,13 @@ def effective_samples_of_pair(
     for one series, this is not fooled by two oscillations that cross zero a frame apart.
 
     x, y : shape (n,), any units. Rows in which either is not finite are gaps.
-    stretches : as in `effective_samples`.
+    intervals : as in `effective_samples`.
     Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    parts = finite_stretches(stretches, first, second)
+    parts = finite_intervals(intervals, first, second)
     n = sum(stop - start for start, stop in parts)
-    if n < MINIMUM_SAMPLES or any(is_constant(joined(s, parts)) for s in (first, second)):
+    if n < MINIMUM_SAMPLES or any(is_constant(concatenated(s, parts)) for s in (first, second)):
         return float("nan")
     products_x, counts = _lagged_products(first, parts)
     products_y, _ = _lagged_products(second, parts)
@@ -289,14 +289,14 @@ def effective_samples_of_pair(
 
 
 def _lagged_products(
-    series: NDArray[np.float64], stretches: Stretches
+    series: NDArray[np.float64], intervals: Intervals
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum over all pairs k apart of the centred series, and the number of pairs, k = 0 .. n-1."""
-    first, last = stretches[0][0], stretches[-1][1]
+    first, last = intervals[0][0], intervals[-1][1]
     present = np.zeros(last - first)
     centred = np.zeros(last - first)
-    mean = joined(series, stretches).mean()
-    for start, stop in stretches:
+    mean = concatenated(series, intervals).mean()
+    for start, stop in intervals:
         present[start - first : stop - first] = 1.0
         centred[start - first : stop - first] = series[start:stop] - mean
     counts = np.round(_correlate_with_itself(present))

@@ -143,13 +143,13 @@ def _by(recordings: Iterable[Found], keys: Iterable[str]) -> dict[str, list[Foun
 
 def _person_folders(recordings: Sequence[Found]) -> list[str]:
     """The folder that names each recording's person; empty where folders only sort."""
-    telling = [
+    different = [
         [folder for folder in one.folders if not _SESSION.match(folder) and not _only_sorts(folder)]
         for one in recordings
     ]
-    while len({tuple(folders[:1]) for folders in telling}) == 1 and telling[0]:
-        telling = [folders[1:] for folders in telling]  # all lie in it
-    return [folders[0] if folders else "" for folders in telling]
+    while len({tuple(folders[:1]) for folders in different}) == 1 and different[0]:
+        different = [folders[1:] for folders in different]  # all lie in it
+    return [folders[0] if folders else "" for folders in different]
 
 
 def _in_one_folder(recordings: Sequence[Found], notes: list[str]) -> dict[str, list[Found]]:

@@ -96,8 +96,8 @@ def columns_of(header: Sequence[str]) -> Columns:
     others = [t for k, t in enumerate(header) if k not in {c.index for c in found}]
     near = _misspelt(others, [name for name in KNOWN if name not in known])
     faults += [f"has a column {title!r} and no {name}" for title, name in near]
-    told = {*known, *(c.name for c in found), *(name for _, name in near)}
-    if lost := [name for name in REQUIRED if name not in told]:
+    named = {*known, *(c.name for c in found), *(name for _, name in near)}
+    if lost := [name for name in REQUIRED if name not in named]:
         faults.append(f"has no column {', '.join(lost)}")
     return Columns(known, tuple(faults))
 
@@ -135,7 +135,7 @@ def _misspelt(titles: Sequence[str], lacking: Sequence[str]) -> list[tuple[str, 
 
 
 def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
-    """With legend and units of the JSON that BIDS puts beside the table; and what is to be said.
+    """With legend and units of the JSON that BIDS puts next to the table; and what is to be said.
 
     A legend in the table's own header goes before it.
     """
@@ -319,7 +319,7 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
     sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
     faults = [] if sex else [_sex_fault(cells["sex"], row.id)]
     mass, height = (_Found(cells.get(q.column, ""), q, table.columns) for q in (MASS, HEIGHT))
-    _settle(mass, height)
+    _decide(mass, height)
     faults += [one.fault(row.id) for one in (mass, height) if one.is_lost]
     if faults:
         found, expected, remedies = zip(*faults, strict=True)
@@ -348,7 +348,7 @@ def _sex_fault(text: str, name: str) -> _Clauses:
             'header, as in "sex (0=F, 1=M)", or as Levels in participants.json'
         )
     elif text.strip().casefold() == "m":
-        remedy = "write mujer or man: beside H an M may be either"
+        remedy = "write mujer or man: next to H an M may be either"
     return f"sex {text!r} of {name}", "M, F, other or n/a", remedy
 
 
@@ -393,7 +393,7 @@ class _Found:
         return f"{self.title} {self.text!r} of {name}", expected, remedy
 
 
-def _settle(mass: _Found, height: _Found) -> None:
+def _decide(mass: _Found, height: _Found) -> None:
     """Of several units keep those with which mass and height are of one person."""
     if not mass.readings or not height.readings:
         return

@@ -101,7 +101,7 @@ class _Loading:
             self.participants[person.id.casefold()] = person
 
     def look_around(self, named: set[str]) -> None:
-        """What lies beside the folders of those whom participants.tsv names."""
+        """What lies next to the folders of those whom participants.tsv names."""
         try:
             paths = entries(self.root)
         except BadDataError as closed:

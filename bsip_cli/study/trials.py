@@ -17,7 +17,7 @@ Role = Literal["static", "sequence", "validation"]
 
 RECORDINGS = (".c3d", ".trc")
 MANY = 20
-"""So many names are no more told one by one in a message."""
+"""So many names are no more listed one by one in a message."""
 
 _TRIAL = re.compile(
     r"(?P<participant>sub-[A-Za-z0-9]+)(_ses-(?P<session>[A-Za-z0-9]+))?"
@@ -46,7 +46,7 @@ class Trial:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """All that is read of it: the recording, and the ground forces beside a TRC."""
+        """All that is read of it: the recording, and the ground forces next to a TRC."""
         return (self.path, self.forces) if self.forces else (self.path,)
 
 
@@ -118,7 +118,7 @@ class Folder:
     refusals: list[BadDataError] = field(default_factory=list)
     others: list[Path] = field(default_factory=list)
     spare_forces: list[Path] = field(default_factory=list)
-    """Tables beside a C3D, which has forces of its own."""
+    """Tables next to a C3D, which has forces of its own."""
 
     def look_through(self, folder: Path, session: str | None = None) -> None:
         """Say of every entry what it is.
@@ -175,16 +175,16 @@ class Folder:
         return None
 
     def _forces(self, path: Path, names: set[str]) -> None:
-        """A table of forces is read with its TRC, spare beside a C3D, and lost without both."""
+        """A table of forces is read with its TRC, spare next to a C3D, and lost without both."""
         stem = trial_stem(path)
-        beside = {f"{s}{kind}".casefold() for s in (stem, path.stem) for kind in RECORDINGS}
-        found = {Path(name).suffix for name in beside & names}
+        there = {f"{s}{kind}".casefold() for s in (stem, path.stem) for kind in RECORDINGS}
+        found = {Path(name).suffix for name in there & names}
         if ".trc" in found:
             return
         if found:
             self.spare_forces.append(path)
         elif _TRIAL.fullmatch(stem):
-            expected = f"{stem}.trc, with its markers, beside it"
+            expected = f"{stem}.trc, with its markers, next to it"
             self.faults.append(
                 Fault(path, "forces without markers", expected, "add that file, or remove this one")
             )
@@ -263,10 +263,10 @@ def _fault_of_file(path: Path) -> Fault | None:
 
 
 def _is_packed_recording(path: Path, names: set[str]) -> bool:
-    """Whether a packed file is called as a recording that does not lie unpacked beside it."""
+    """Whether a packed file is called as a recording that does not lie unpacked next to it."""
     inner = path.stem.removesuffix(".tar")
     kind = Path(inner).suffix.lower()
     if kind in (*RECORDINGS, *ENDINGS):
         return inner.casefold() not in names
-    beside = {f"{inner}{ending}".casefold() for ending in RECORDINGS}
-    return bool(_TRIAL.fullmatch(inner)) and not beside & names
+    there = {f"{inner}{ending}".casefold() for ending in RECORDINGS}
+    return bool(_TRIAL.fullmatch(inner)) and not there & names

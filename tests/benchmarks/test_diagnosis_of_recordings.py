@@ -47,9 +47,9 @@ def test_verdicts():
     nothing = answer()
     right = found("plate_translation", "1", x=0.02, y=0.0, z=0.0)
     assert verdict(SHIFT, nothing, answer(right)) == RIGHT
-    rival = found("plate_zero", "1 mx", "A", offset=5.0)
+    other = found("plate_zero", "1 mx", "A", offset=5.0)
     member = found("plate_translation", "1", "A", x=0.02, y=0.0, z=0.0)
-    assert verdict(SHIFT, nothing, answer(member, rival)) == IN_CLASS
+    assert verdict(SHIFT, nothing, answer(member, other)) == IN_CLASS
     elsewhere = found("plate_translation", "2", x=0.02, y=0.0, z=0.0)
     assert verdict(SHIFT, nothing, answer(elsewhere)) == ELSEWHERE
     assert verdict(SHIFT, nothing, nothing) == MISSED

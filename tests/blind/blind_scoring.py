@@ -305,7 +305,7 @@ def _estimates(out: Path, recorded: Recorded, answer: Answer, sought: Expected) 
 
 
 def _bounds(folder: Path, answer: Answer, sought: Expected) -> dict[str, float]:
-    """Of the cause as kept, per parameter; nothing of a rival that was not kept itself."""
+    """Of the cause as kept, per parameter; nothing of a candidate that was not kept itself."""
     path = folder / f"{folder.name}_diagnosis.parquet"
     if not path.is_file():
         return {}

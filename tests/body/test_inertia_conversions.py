@@ -122,7 +122,7 @@ def test_nothing_physical_is_nearer_than_the_nearest():
     for size in (0.001, 0.01, 0.1):
         for _ in range(200):
             change = rng.normal(0, size, (3, 3))
-            rival = nearest + change + change.T
-            values, axes = np.linalg.eigh(rival)
-            rival = axes @ np.diag(np.maximum(values, floor)) @ axes.T
-            assert np.linalg.norm(rival - moments) >= distance * (1 - 1e-12)
+            candidate = nearest + change + change.T
+            values, axes = np.linalg.eigh(candidate)
+            candidate = axes @ np.diag(np.maximum(values, floor)) @ axes.T
+            assert np.linalg.norm(candidate - moments) >= distance * (1 - 1e-12)

@@ -169,7 +169,7 @@ def test_unknown_version_names_the_command_to_rerun(written):
         read_artifact(written, "used-blocks")
     assert str(caught.value) == (
         f"{written}: holds used-blocks version 99; expected used-blocks version 1. "
-        "To mend it: run `bsip identify` again."
+        "To correct it: run `bsip identify` again."
     )
 
 

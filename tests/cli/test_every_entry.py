@@ -123,7 +123,7 @@ MISNAMED = "its name does not say what it is"
         ([f"{'sub-01_task-':w<{STEM_BYTES + 1}}.c3d"], f"letters before .* at most {STEM_BYTES}"),
         (
             ["sub-01_task-walk.trc", "sub-01_task-walk.mot", "sub-01_task-walk_grf.mot"],
-            "walk.trc: there are sub-01_task-walk.mot and sub-01_task-walk_grf.mot beside it",
+            "walk.trc: there are sub-01_task-walk.mot and sub-01_task-walk_grf.mot next to it",
         ),
         (["sub-01_task-w.trc", "sub-01_task-w.mot", "sub-01_task-w.MOT"], "task-w.MOT and .*mot"),
         (

@@ -46,7 +46,7 @@ def test_command_line_that_cannot_be_understood(bsip, arguments, said):
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ("run {0}/nowhere --out {0}/out", "{0}/nowhere: there is no such folder. To mend it: "),
+        ("run {0}/nowhere --out {0}/out", "{0}/nowhere: there is no such folder. To correct it: "),
         (
             "run {0}/study --out {0}/out --participant sub-07 --participant sub-01 "
             "--participant sub-9",
@@ -149,7 +149,7 @@ def test_corrupt_recording_is_refused_in_one_sentence(bsip, empty_study, tmp_pat
     assert sentence.startswith("ingest: ")
     assert str(recording) in sentence
     assert "; expected " in sentence
-    assert ". To mend it: " in sentence
+    assert ". To correct it: " in sentence
     assert summary == f"bsip ingest: 1 done, 1 refused; results in {out}"
     written = out / "sub-02" / "sub-02_task-static_refusal-ingest.parquet"
     assert {path.name for path in (out / "sub-02").iterdir()} == {

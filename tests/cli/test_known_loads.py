@@ -180,7 +180,7 @@ def test_load_in_the_static_trial_is_no_mass_of_the_person(carried, run):
     run.declare(*WORN)
     assert run.perform("ingest", STATIC).state == "done"
     told = run.perform("scale")
-    assert not [sentence for sentence in told.sentences if "the plates tell" in sentence]
+    assert not [sentence for sentence in told.sentences if "the plates measure" in sentence]
     assert run.read("person").iloc[0]["plate_mass_kg"] == pytest.approx(stated, abs=0.3)
 
 

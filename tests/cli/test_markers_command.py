@@ -95,7 +95,7 @@ def test_an_unknown_set_is_written_down_and_serves(here, capsys):
     path = recording(here, [f"P:{label}" for label in OWN])
     assert told(path) == 0
     said = capsys.readouterr().out
-    assert "none of the shipped sets fits; of 20 labels the words tell 19" in said
+    assert "none of the shipped sets fits; of 20 labels the words identify 19" in said
     assert "  P:LWrist     seen 100.0 %  left forearm, left wrist\n" in said
     assert "  P:Ball#1     seen 100.0 %  not in the set\n" in said
     starter = here / "a_trial_markers.toml"

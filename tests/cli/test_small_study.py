@@ -504,7 +504,7 @@ def test_reader_of_what_is_no_artifact_refuses_it_by_name(run, damage):
     outcome = run.perform("identify")
     assert (outcome.state, outcome.exit_code) == ("refused", 3)
     assert str(path) in outcome.sentences[0]
-    assert "To mend it: run " in outcome.sentences[0]
+    assert "To correct it: run " in outcome.sentences[0]
     assert run.perform("regress").state == "done"
     assert run.perform("identify").state == "done"
     assert not run.path("refusal-identify").exists()
@@ -602,7 +602,7 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     (sentence,) = [line for line in answer.err.splitlines() if str(recording) in line]
     assert sentence.startswith(f"ingest: {recording}: ")
     assert "; expected " in sentence
-    assert ". To mend it: " in sentence
+    assert ". To correct it: " in sentence
     assert " 1 refused, 5 without input;" in answer.summary
     rewritten = run.rewritten(times)
     # What sub-01 tells of the laboratory is less: the diagnosis of sub-02 may change.
@@ -694,7 +694,7 @@ def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
     answer = bsip("ingest", run.study, "--out", tmp_path / "new", "--jobs", 2)
     assert answer.code == 3
     (sentence,) = [line for line in answer.err.splitlines() if line.startswith("study: ")]
-    assert f"{table}: sex '2' of sub-02; expected M, F, other or n/a. To mend it: " in sentence
+    assert f"{table}: sex '2' of sub-02; expected M, F, other or n/a. To correct it: " in sentence
     assert answer.summary.startswith("bsip ingest: 4 done, 1 refused;")
     assert sorted(path.name for path in (tmp_path / "new").iterdir() if path.is_dir()) == ["sub-01"]
 
@@ -729,7 +729,7 @@ def test_warnings_are_told_and_kept(run, bsip):
     answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
     assert answer.code == 0
     (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
-    assert "the plates tell" in told
+    assert "the plates measure" in told
     kept = read_header(run.path("person"))["provenance"]["messages"]
     assert told.removeprefix("scale: ") in kept
 
@@ -867,7 +867,7 @@ def test_a_second_run_on_the_same_folder_is_refused(run, bsip, holder):
     process = holder(run.out / "sub-01")
     answer = bsip("run", run.study, "--out", run.out, "--force")
     assert answer.code == 2
-    assert "sub-01: another bsip is writing there. To mend it: wait until" in answer.err
+    assert "sub-01: another bsip is writing there. To correct it: wait until" in answer.err
     assert {n: run.files()[n].read_bytes() for n in before if "sub-01" in n} == {
         n: content for n, content in before.items() if "sub-01" in n
     }

@@ -6,7 +6,7 @@ import pytest
 
 from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.report.tables.build import IN_PRINT, NAMES, RENDERERS, show
-from bsip_cli.report.tables.published import name_beside
+from bsip_cli.report.tables.published import comparison_name
 from bsip_cli.running.runner import perform
 from bsip_cli.stages import stats as stats_stage
 
@@ -202,7 +202,9 @@ def test_freshness_and_files(make_cohort):
     assert [cohort.perform(name).state for name in ("stats", "tables")] == ["fresh", "fresh"]
     files = sorted(path.name for path in (cohort.out / "group" / "tables").iterdir())
     assert files == sorted(
-        f"{name}.{ending}" for name in (*NAMES, *map(name_beside, IN_PRINT)) for ending in RENDERERS
+        f"{name}.{ending}"
+        for name in (*NAMES, *map(comparison_name, IN_PRINT))
+        for ending in RENDERERS
     )
     listed = cohort.group("tables-files")
     assert sorted(listed["file"]) == [f"group/tables/{file}" for file in files]

@@ -13,11 +13,11 @@ from bsip_cli.report.tables.formats import escape_latex as latex
 from bsip_cli.report.tables.formats import escape_markdown as markdown
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
 from bsip_cli.report.tables.model import Column, Row, Table, interval, mean_sd, number, p_value
-from bsip_cli.report.tables.published import name_beside
+from bsip_cli.report.tables.published import comparison_name
 from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import Criteria
 
-BESIDE = tuple(map(name_beside, IN_PRINT))
+BESIDE = tuple(map(comparison_name, IN_PRINT))
 NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"
 
 

@@ -24,7 +24,7 @@ NOISE = np.array([2.0, 2.0, 4.0, 1.0, 1.0, 0.5])  # [N, N m] of the whole wrench
 
 
 def part_of_moving(first_s: float, duration_s: float, amplitude: float = 0.4) -> Scene:
-    """A stretch of one long movement, as a trial of its own."""
+    """A part of one long movement, as a trial of its own."""
     whole = moving(first_s + duration_s, amplitude)
     part = slice(round(first_s * whole.rate_hz), None)
     return scene_of(whole.q[part], whole.v[part], whole.a[part])
@@ -43,7 +43,7 @@ def noisy(scene: Scene, seed: int, times: float = 1.0) -> Scene:
 
 
 def late(scene: Scene, delay_s: float) -> Scene:
-    """All plates show their course a moment later."""
+    """All plates show their signal a moment later."""
     at = np.clip(scene.times_s - delay_s, scene.times_s[0], None)
     plates = tuple(
         replace(plate, wrench=CubicSpline(scene.times_s, plate.wrench)(at))

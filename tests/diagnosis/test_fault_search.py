@@ -163,9 +163,9 @@ def test_a_residual_of_another_kind_is_no_gain(seed):
     reading explains them, what is simulated does not."""
     scene = movement(seed)
     slow = np.random.default_rng(seed).normal(size=(len(scene.times_s) // 25 + 2, 2))
-    course = np.repeat(slow, 25, axis=0)[: len(scene.times_s)]
-    smooth = np.apply_along_axis(lambda x: np.convolve(x, np.hanning(60) / 30, "same"), 0, course)
-    more = np.zeros((len(course), 6))
+    signal = np.repeat(slow, 25, axis=0)[: len(scene.times_s)]
+    smooth = np.apply_along_axis(lambda x: np.convolve(x, np.hanning(60) / 30, "same"), 0, signal)
+    more = np.zeros((len(signal), 6))
     more[:, :2] = 0.3 * smooth * scene.measured[:, :2].std(axis=0)
     findings = told(found_in(shown(scene, more), movement(seed + 10, 8.0)))
     assert "plate_gain" not in {one.effect for one in findings}

@@ -1,25 +1,25 @@
-"""What is wrong without any effect: a body that wanders, and the spline's own bias."""
+"""What is wrong without any effect: a body that drifts, and the spline's own bias."""
 
 import numpy as np
 import pytest
 from scipy.signal import butter, freqs, sosfiltfilt
 
 from bsip_cli.diagnosis.error_terms import (
+    DRIFT_M,
     SKIN_HZ,
-    WANDER_M,
+    drift,
     smoothing_bias,
     stays_behind,
-    wander,
 )
 from tests.effects.moving_scene import moving
 
 
-def test_a_body_that_wanders_moves_the_pressure_by_a_millimetre():
+def test_a_body_that_drifts_moves_the_pressure_by_a_millimetre():
     scene = moving()
-    columns = wander(scene)
+    columns = drift(scene)
     weight = scene.predicted[:, 2].mean()
     moment = np.sqrt((columns[:, 3:5] ** 2).sum(axis=2).mean(axis=0))
-    np.testing.assert_allclose(moment / weight, WANDER_M, rtol=0.2)
+    np.testing.assert_allclose(moment / weight, DRIFT_M, rtol=0.2)
     assert np.abs(columns[:, :3]).max() == 0.0
 
 

@@ -17,9 +17,9 @@ from bsip_cli.diagnosis.patterns import (
     Play,
     Spring,
     Warming,
-    course_of,
+    signal_of,
 )
-from bsip_cli.effects.scene import Scene, standing_place_m
+from bsip_cli.effects.scene import Scene, place_of_stance_m
 from tests.diagnosis.noisy_trial import part_of_moving
 from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
 
@@ -65,13 +65,13 @@ def test_a_step_below_the_least_size_is_still_finite(pattern, scene):
 @pytest.mark.parametrize("pattern", [Curve(), Play(), Lag(), Warming(), Bow()])
 @pytest.mark.parametrize("channel", ["fx", "mx", "mz"])
 def test_where_the_lab_has_its_origin_says_nothing(pattern, channel, scene):
-    """The same person elsewhere: the same course about the place where they stand."""
+    """The same person elsewhere: the same signal about the place where they stand."""
     q = scene.q.copy()
     q[:, :3] += AWAY_M
     elsewhere = replace(scene, q=q)
     values = values_of(pattern, scene, channel, 1.0)
     here, there = (
-        course_of(one, pattern.change(one, channel, values), channel) for one in (scene, elsewhere)
+        signal_of(one, pattern.change(one, channel, values), channel) for one in (scene, elsewhere)
     )
     assert np.abs(here).max() > 0
     np.testing.assert_allclose(there, here, atol=1e-6 * np.abs(here).max())
@@ -79,10 +79,10 @@ def test_where_the_lab_has_its_origin_says_nothing(pattern, channel, scene):
 
 def test_a_moment_is_about_where_the_valid_frames_stand(scene):
     part = replace(scene, valid=scene.times_s > 3)
-    place = standing_place_m(part)
+    place = place_of_stance_m(part)
     np.testing.assert_allclose(place, [*part.q[part.valid, :2].mean(axis=0), 0])
     pushed = Curve().change(part, "fz", np.array([10.0]))
-    np.testing.assert_allclose(course_of(part, pushed, "mx"), 0, atol=1e-9)
+    np.testing.assert_allclose(signal_of(part, pushed, "mx"), 0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

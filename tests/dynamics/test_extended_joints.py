@@ -11,7 +11,7 @@ from bsip_cli.dynamics.joint_moments import Ground, joint_loads
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.loads import Implement
 from bsip_cli.effects.scene import Scene
-from bsip_cli.stages.joints import besides, in_true_axes, sharing
+from bsip_cli.stages.joints import in_true_axes, other_loads, sharing
 from tests.dynamics.test_joint_moments import KNOWN, feet, motion, phi_of
 from tests.effects.moving_scene import unwritable
 
@@ -51,7 +51,7 @@ def test_what_two_hands_hold_loads_the_waist_whole():
     valid = np.ones(len(q), bool)
     scene = Scene(np.arange(len(q)) / 40.0, person, q, v, a, phi[:, 0], (), valid)
     both = cause("implement", "hand_l+hand_r", 0.4, 1.0, 0.3, 0.2, 4 / 3)
-    touched = besides(scene, {}, [both])
+    touched = other_loads(scene, {}, [both])
     needs = Implement().change(scene, both.target, both.values)
     assert np.abs(touched["hand_l"].wrench + touched["hand_r"].wrench + needs).max() < 1e-9
     names = np.array(person.skeleton.joints[1:])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.dynamics.lowpass import lowpass_operator, stretches, stride_to
+from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to, valid_intervals
 
 
 def holed(count, seed):
@@ -24,7 +24,7 @@ def test_rows_sum_to_one(stride):
 def test_never_crosses_a_gap(stride):
     valid = holed(500, 2)
     operator, frames = lowpass_operator(valid, 100.0, 3.0, stride)
-    spans = stretches(valid)
+    spans = valid_intervals(valid)
     assert valid[frames].all()
     for row, frame in zip(operator.toarray(), frames, strict=True):
         start, stop = next(s for s in spans if s[0] <= frame < s[1])
@@ -42,10 +42,10 @@ def test_what_stands_in_the_gaps_does_not_matter():
     np.testing.assert_array_equal(operator @ wild, operator @ signal)
 
 
-def test_every_stretch_has_an_output():
+def test_every_interval_has_an_output():
     valid = np.array([1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1, 1], dtype=bool)
     _, frames = lowpass_operator(valid, 100.0, 5.0, stride=5)
-    assert [sum(a <= f < b for f in frames) for a, b in stretches(valid)] == [1, 1, 1]
+    assert [sum(a <= f < b for f in frames) for a, b in valid_intervals(valid)] == [1, 1, 1]
 
 
 def test_all_columns_and_sums_alike():
@@ -98,8 +98,8 @@ def test_nothing_valid():
     operator, frames = lowpass_operator(np.zeros(50, dtype=bool), 100.0, 8.0, 3)
     assert operator.shape == (0, 50)
     assert len(frames) == 0
-    assert stretches(np.zeros(5, dtype=bool)) == []
-    assert stretches(np.array([1, 1, 0, 1], dtype=bool)) == [(0, 2), (3, 4)]
+    assert valid_intervals(np.zeros(5, dtype=bool)) == []
+    assert valid_intervals(np.array([1, 1, 0, 1], dtype=bool)) == [(0, 2), (3, 4)]
 
 
 @pytest.mark.parametrize("seconds", [2, 5, 8, 14, 60])

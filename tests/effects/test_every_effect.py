@@ -126,11 +126,13 @@ def test_at_a_bound_it_would_go_beyond(effect, scene):
 
 def test_what_can_last():
     """Faults of the lab and facts of the person are the same in all trials; an event is not."""
-    assert all(effect.lasts == (effect.of_the_lab or effect.of_the_person) for effect in CATALOGUE)
-    lasting = {name for name, effect in EFFECTS.items() if effect.lasts}
-    assert {"sync_offset", "plate_gain", "joint_centre"} <= lasting
+    assert all(
+        effect.is_shared == (effect.is_of_laboratory or effect.is_of_person) for effect in CATALOGUE
+    )
+    shared = {name for name, effect in EFFECTS.items() if effect.is_shared}
+    assert {"sync_offset", "plate_gain", "joint_centre"} <= shared
     events = {"added_mass", "released_object", "unmeasured_contact", "marker_shift"}
-    assert lasting.isdisjoint(events)
+    assert shared.isdisjoint(events)
 
 
 def test_soft_tissue_is_looked_for_only_after_an_impact(scene):

@@ -70,9 +70,9 @@ def test_an_offset_is_not_shared_by_a_trial_whose_zero_was_taken_off():
     first, *others = scene.plates
     zeroed = replace(scene, plates=(replace(first, zeroed=True), *others))
     target = f"{first.name} fz"
-    assert PlateZero().is_shared(scene, target) and not PlateZero().is_shared(zeroed, target)
-    assert PlateZero().is_shared(zeroed, f"{others[0].name} fz")
-    assert PlateGain().is_shared(zeroed, target)
+    assert PlateZero().is_shared_at(scene, target) and not PlateZero().is_shared_at(zeroed, target)
+    assert PlateZero().is_shared_at(zeroed, f"{others[0].name} fz")
+    assert PlateGain().is_shared_at(zeroed, target)
     assert target in PlateZero().targets(zeroed)  # it may be wrong there for reasons of its own
 
 

@@ -463,7 +463,7 @@ def test_what_has_no_name_is_said(hide, capsys):
     study = hide(GAIN[0])
     study.diagnosed_as(alike=[("unexplained", "")])
     study.exported()
-    assert ": nothing tells its course exactly" in capsys.readouterr().err
+    assert ": its signal is not known exactly" in capsys.readouterr().err
 
 
 def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):

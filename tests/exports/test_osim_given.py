@@ -290,7 +290,7 @@ def test_opensim_reads_it(case, identified, tmp_path):
     ],
 )
 def test_file_that_is_no_model(content, said):
-    with pytest.raises(UsageError, match="To mend it: open the model in OpenSim 4") as error:
+    with pytest.raises(UsageError, match="To correct it: open the model in OpenSim 4") as error:
         read_given_model(content, "given.osim")
     assert said in str(error.value)
 

@@ -38,10 +38,12 @@ def problem_with(change, beside):
     one = replace(one, wrench=change(one.wrench))
     model, phi = world().model, world().prior.phi
     reference = np.append(one.q[:, :2].mean(axis=0), 0.0)
-    joint = accumulate(model, [one], 8.0, reference, beside=ERRING)
+    joint = accumulate(model, [one], 8.0, reference, instruments=ERRING)
     noise = even_noise(np.array([3.0, 3, 3, 1, 1, 1]), joint.samples)
     body = joint.of_the_body(len(phi))
-    return Problem(body, noise, world().prior, world().basis, 4.0, beside=joint if beside else None)
+    return Problem(
+        body, noise, world().prior, world().basis, 4.0, jointly=joint if beside else None
+    )
 
 
 def aside(wrench):

@@ -37,8 +37,8 @@ def test_weights_count_independent_samples():
     np.testing.assert_allclose(noise.weights() * noise.rms**2, 0.1 / 1.9, rtol=0.3)
 
 
-def test_stretches_do_not_run_into_each_other():
-    """Two long stretches with a jump between: the same as one series of both, not less."""
+def test_intervals_do_not_run_into_each_other():
+    """Two long intervals with a jump between: the same as one series of both, not less."""
     parts = [ar1(0.5, 3000, seed=3), ar1(0.5, 3000, seed=4)]
     apart, joined = noise_of([even(p) for p in parts]), noise_of([even(np.concatenate(parts))])
     np.testing.assert_allclose(apart.rms, joined.rms)

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
-from bsip_cli.motion.marker_exchange import Exchange, as_recorded, misfit_m, put_right, refitted
+from bsip_cli.motion.marker_exchange import (
+    Exchange,
+    as_recorded,
+    exchanged_back,
+    misfit_m,
+    refitted,
+)
 from tests.marker_evidence.swinging_markers import MARKERS, PERSON, fitted, recording
 
 ARM = ("upper_arm_r", "forearm_r", "hand_r")
@@ -38,7 +44,7 @@ def test_a_swap_is_undone(a, b, frames):
     found = judged(markers, times)
     (event,) = found.events
     assert event.put_right
-    assert found.put_right()
+    assert found.any_corrected()
     assert event.sentence.endswith("; corrected")
     assert np.array_equal(found.markers_m, clean)
 
@@ -94,7 +100,7 @@ def test_swaps_at_two_times_are_both_undone():
 def test_right_labels_stay(seed):
     times, clean, _ = recording(seed)
     found = judged(clean, times)
-    assert not found.put_right()
+    assert not found.any_corrected()
     assert found.markers_m is clean
 
 
@@ -148,7 +154,7 @@ def suspected(farther: str, factor: float):
         return replace(again, residual_m=residual)
 
     one = [Exchange(a, b, frames, 9.0)]
-    return put_right(as_recorded(fit), refitted(fit, refit, one), refit, one), fit
+    return exchanged_back(as_recorded(fit), refitted(fit, refit, one), refit, one), fit
 
 
 @pytest.mark.parametrize("label", ["RKNEL", "RKNEM"])
@@ -174,6 +180,6 @@ def test_a_swap_after_which_all_markers_fit_worse_is_not_undone():
     near = replace(fit, residual_m=a_worse_fit.residual_m.copy())
     near.residual_m[:40, :2] = 0.0
     near.residual_m[40:] += 0.01
-    labelling = put_right(as_recorded(a_worse_fit), near, lambda m, t: near, one)
+    labelling = exchanged_back(as_recorded(a_worse_fit), near, lambda m, t: near, one)
     assert not labelling.events[0].put_right
     assert labelling.fit is a_worse_fit

@@ -230,7 +230,7 @@ def test_a_trial_is_solved_from_its_best_seen_frame_to_both_ends():
 
 
 def test_a_person_who_walks_in_and_out_is_solved_between():
-    """Whole stretches without any marker at both ends."""
+    """Whole intervals without any marker at both ends."""
     person = standing().person
     markers = np.repeat(markers_of(person, standing().q[None]), 12, axis=0)
     markers[:4] = markers[9:] = np.nan

@@ -83,7 +83,7 @@ def opencap(tmp_path_factory):
 def test_opencap_runs_and_says_what_it_met(opencap):
     done, out = opencap
     assert done.returncode == 0, done.stderr
-    assert "the plates tell 60.18 kg (to 1.1 %)" in done.stderr
+    assert "the plates measure 60.18 kg (to 1.1 %)" in done.stderr
     assert "stated are 62.60 kg (-3.9 %, tolerance 2 %)" in done.stderr
     assert "no markers on the head" in done.stderr
     assert (out / "sub-01" / "report.html").exists()

@@ -272,5 +272,5 @@ def test_two_files_of_forces_are_refused(tmp_path, other):
     _lines(tmp_path)
     for name in ("a.MOT", other):
         (tmp_path / name).write_text("x")
-    with pytest.raises(BadDataError, match="beside it; expected one file of ground forces"):
+    with pytest.raises(BadDataError, match="next to it; expected one file of ground forces"):
         read_recording(tmp_path / "a.trc")

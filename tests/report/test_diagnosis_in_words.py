@@ -192,8 +192,7 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     )
     both = pd.concat([large, found[found["rank"] > 1]])
     assert (
-        light_of(both, detection(TRIALS)).title
-        == "Large error, cause unknown; besides it 1 fault found"
+        light_of(both, detection(TRIALS)).title == "Large error, cause unknown; also 1 fault found"
     )
 
 
@@ -241,9 +240,9 @@ def test_an_interval_has_a_sign_where_its_sentence_has_one(found):
         sentence="the forces were recorded 20.0 ms before the markers (delay: 95 % interval -0.0)",
     )  # fmt: skip
     (one,) = candidates_of(late)
-    assert one.told().endswith("20.0 ms before the markers (95 % interval 19.0 to 21.0 ms)")
+    assert one.in_words().endswith("20.0 ms before the markers (95 % interval 19.0 to 21.0 ms)")
     drift = late.assign(effect="plate_drift", parameter="drift", unit="N/s", sentence="by -0.02 N")
-    assert candidates_of(drift)[0].told() == "by −0.02 N (95 % interval −0.0210 to −0.0190 N/s)"
+    assert candidates_of(drift)[0].in_words() == "by −0.02 N (95 % interval −0.0210 to −0.0190 N/s)"
 
 
 def test_a_regularity_without_a_name_has_a_label(found):

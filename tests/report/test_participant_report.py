@@ -169,11 +169,10 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, most of it the table's segment parameters (70 %); besides it 1 fault found"
+        "Large error, most of it the table's segment parameters (70 %); also 1 fault found"
     )
     assert (
-        light_of(beside, record.detection).title
-        == "Large error, cause unknown; besides it 1 fault found"
+        light_of(beside, record.detection).title == "Large error, cause unknown; also 1 fault found"
     )
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error

@@ -75,7 +75,7 @@ def test_runs_and_thinning():
     assert len(np.arange(100_000)[thinned(100_000)]) <= 1200
 
 
-def test_window_is_the_middle_of_the_longest_stretch():
+def test_window_is_the_middle_of_the_longest_interval():
     time = np.arange(0.0, 30.0, 0.1)
     flags = (time < 4.0) | (time > 8.95)
     window = middle_of_longest(time, flags, 10.0)

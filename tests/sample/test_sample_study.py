@@ -46,8 +46,8 @@ def truth(name: str) -> dict:
 def test_om_beats_rm_on_unseen_movements_in_every_component(out):
     errors = held_out_errors(out).groupby("component").mean()
     for component in COMPONENTS:
-        rivals = errors.loc[component, ["RM", "RM+mass"]]
-        assert errors.loc[component, "OM"] < rivals.min(), component
+        others = errors.loc[component, ["RM", "RM+mass"]]
+        assert errors.loc[component, "OM"] < others.min(), component
 
 
 def test_om_halves_the_error_of_the_cop_in_the_identification_sequence(out):
@@ -112,7 +112,7 @@ def test_valid_windows_follow_the_true_contacts(out):
 
 
 def test_the_balls_that_nobody_tells_of_are_found(out):
-    """In 11 of 12 throws, of which two seconds or less can be used, and nothing else is named.
+    """In 11 of 12 throws, of which two seconds or less can be used; nothing else is named.
 
     When a ball leaves the hand in the air no plate feels it, so such times are left out of the
     count; intervals of some others are too narrow (6 or 7 hundredths of a second off, or in a gap).

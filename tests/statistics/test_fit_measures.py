@@ -47,7 +47,7 @@ def test_against_the_formulas_of_the_notes():
     assert fit.n_effective == pytest.approx(500, rel=0.1)
 
 
-def test_only_finite_samples_of_the_stretches_count():
+def test_only_finite_samples_of_the_intervals_count():
     spoilt = SINE.copy()
     spoilt[200:300] = 50.0
     spoilt[10] = np.nan
@@ -128,7 +128,7 @@ def test_ellipse_holds_95_percent_of_normal_points():
 
 def test_no_path_and_no_time_across_a_gap():
     ap = np.arange(10) * 1e-3
-    ap[5:] += 1.0  # a jump of a metre between the stretches
+    ap[5:] += 1.0  # a jump of a metre between the intervals
     sway = posturography(ap, np.zeros(10), RATE_HZ, [(0, 5), (5, 10)])
     assert sway.sway_length_mm == pytest.approx(8.0)
     assert sway.duration_s == pytest.approx(0.08)

@@ -76,12 +76,12 @@ def _pose(skeleton: Skeleton, q: np.ndarray, determined: np.ndarray) -> Iterator
     for c, part in enumerate("xyzw", start=3):
         name = f"{base}_quat_{part}"
         yield Channel(name, f"quat_{part}", "ORNT", base, "n/a", "global", seen(known[:, c]))
-    for name, course in coordinates(skeleton, known).items():
+    for name, trajectory in coordinates(skeleton, known).items():
         joint, part = name.rsplit("_", 1)
         if joint == skeleton.joints[0]:
             continue
         axis = part[1] if part in ("rx", "ry", "rz") else "n/a"
-        values = seen(np.rad2deg(course))
+        values = seen(np.rad2deg(trajectory))
         yield Channel(name, axis, "JNTANG", joint, "deg", "joint", values)
 
 

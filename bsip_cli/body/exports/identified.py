@@ -74,7 +74,7 @@ class IdentifiedPerson:
         for i, (name, old) in enumerate(
             zip(self.person.skeleton.body_names, inertias, strict=True)
         ):
-            if old.is_physical() or old.mass_kg <= 0:  # a mass is not mended
+            if old.is_physical() or old.mass_kg <= 0:  # a mass is not corrected
                 continue
             tensor = nearest_physical_tensor(old.tensor_kgm2)
             change = np.linalg.norm(tensor - old.tensor_kgm2) / np.linalg.norm(old.tensor_kgm2)

@@ -20,7 +20,7 @@ _FORCE, _POINT, _TORQUE = "{}_force_v", "{}_force_p", "{}_torque_"
 
 
 def coordinates(skeleton: Skeleton, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Name and course (N,) [rad, m] of every coordinate of `osim_text`, from q (N, nq).
+    """Name and trajectory (N,) [rad, m] of every coordinate of `osim_text`, from q (N, nq).
 
     Angles run on without jumps of a turn, and through the pose where the middle one is 90 degrees.
     """
@@ -36,7 +36,7 @@ def coordinates(skeleton: Skeleton, q: np.ndarray) -> dict[str, np.ndarray]:
             ways = _UP @ q[:, start : start + 3].T
             turn = Rotation.from_matrix(_UP) * Rotation.from_quat(q[:, start + 3 : start + 7])
         parts = zip(COORDINATES[kind], [*_angles(turn).T, *ways], strict=False)
-        found |= {f"{name}_{part}": course for part, course in parts}
+        found |= {f"{name}_{part}": trajectory for part, trajectory in parts}
     return found
 
 
@@ -100,7 +100,7 @@ def setup_xml(
     name: str, files: Mapping[str, str], from_s: float, to_s: float, said: Sequence[str]
 ) -> str:
     """Set-up of InverseDynamicsTool; files : ``model_file``, ``coordinates_file`` and
-    ``external_loads_file``, beside it. The motion is smooth: no further filter."""
+    ``external_loads_file``, next to it. The motion is smooth: no further filter."""
     document = _document(said)
     tool = ET.SubElement(document, "InverseDynamicsTool", name=name)
     texts = {"results_directory": ".", **files, "time_range": f"{from_s:.12g} {to_s:.12g}"}

@@ -37,6 +37,7 @@ from bsip_cli.report.cohort.record import (
 )
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
+    ENDS_AT,
     FORCE_LIMIT_PERCENT,
     Yardstick,
     one_number_alone,
@@ -49,6 +50,7 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import (
     MISSING,
+    abbreviations,
     capital,
     component_label,
     count,
@@ -58,6 +60,7 @@ from bsip_cli.report.words import (
     percent,
     signed,
     significant,
+    task_of,
     trial_label,
 )
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
@@ -68,7 +71,7 @@ SHOWN = {
 }
 """Columns of a participant's artifacts that are shown."""
 
-_KEPT = ("n", "p")  # columns of the tables, beside means
+_KEPT = ("n", "p")  # columns of the tables, next to means
 _MOST = 6  # sentences of a kind on the first page
 _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
@@ -78,7 +81,7 @@ _FEWEST = 5  # persons among whom one can lie far out
 
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
-        title="Cohort: do motion and measured forces agree?",
+        title="Cohort (all participants): do motion and measured forces agree?",
         subtitle="Ground forces measured by plates, against those computed from markers.",
         front=tuple(_front(record)),
         sections=(
@@ -144,7 +147,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(Strip(title, values, names, far, one.good, one.limit))
+        drawn.append(Strip(title, values, names, far, one.good, one.limit, ENDS_AT * one.limit))
         rows[one.name] = list(values)
         far_out += [
             (
@@ -162,7 +165,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         "yardsticks",
         "A dot per person, with the parameters to use; the line is the median. COP: centre of "
         "pressure. Blue: as good as published (Hansen 2017, table 4; markers: quiet stance). Red: "
-        "large (Hicks 2015; OpenSim's checklist).",
+        "large (Hicks 2015; OpenSim's checklist). Triangles: beyond the axis, with the number.",
         "Strips of dots: errors per person.",
         "low and close together is good. All high: the laboratory. One high: that person.",
         "read the laboratory's part below, or the report of who lies far out.",
@@ -263,8 +266,8 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
                 yield from _table(table)
             if own := files.pop(table.name, []):
                 yield Links("As a file:", tuple(own))
-        beside = tuple((name, of[0][1]) for name, of in files.items())
-        yield from [Links("Beside the published values:", beside)] if beside else []
+        published = tuple((name, of[0][1]) for name, of in files.items())
+        yield from [Links("Next to the published values:", published)] if published else []
 
 
 def _table(table: Table) -> Iterator[Block]:
@@ -308,7 +311,7 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         )
     worse = []
     for name in names:
-        over = ratios.over_rival(name)
+        over = ratios.over_best_other(name)
         fewer, more, _ = _counts(over)
         worse += [component_label(name)] if _typical(over) > 0.0 or more > fewer else []
     yield Paragraph(
@@ -364,7 +367,7 @@ def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
 
 
 def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
-    better, worse, everyone = _counts(ratios.over_rival(component))
+    better, worse, everyone = _counts(ratios.over_best_other(component))
     return (
         component_label(component),
         *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),
@@ -425,6 +428,8 @@ def diagnoses_section(record: CohortRecord) -> Section:
     if rows:
         head = ("participant", "found", "recordings", "probability")
         caption = "Probability: that the cause, or one of the group, is there"
+        if short := abbreviations(task_of(t) for one in people for t in one.trials):
+            caption += f". {short}"
         blocks.append(Grid(head, rows, caption, words=3))
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
@@ -456,8 +461,8 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
     for one in people:
         if one.was_searched and not one.causes:
             movements = labelled(listing(list(one.trials)))
-            told = f" (searched: {movements})" if one.trials else ""
-            of_movements.setdefault(told, []).append(one.id)
+            where = f" (searched: {movements})" if one.trials else ""
+            of_movements.setdefault(where, []).append(one.id)
     return [
         f"No fault was found in {named_people(names)}{movements}."
         for movements, names in of_movements.items()
@@ -465,10 +470,10 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
 
 
 def _cause_row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
-    told = [capital(one.told()) for one in cause]
+    texts = [capital(one.in_words()) for one in cause]
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
-        told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
+        texts[0] if len(texts) == 1 else f"One of these: {'; '.join(texts)}",
         labelled(listing(list(dict.fromkeys(t for one in cause for t in one.trials)))),
         probability_words(probability_of(cause)) or MISSING,
     )

@@ -105,7 +105,7 @@ def _of_several(table: pd.DataFrame) -> pd.DataFrame:
     return rows[rows.groupby("laboratory")["persons"].transform("max") > 1]
 
 
-_TOLD = {
+_SHOWN = {
     ("sync_offset", "delay"): "a delay of",
     ("plate_translation", "x"): "a plate shifted by",
     ("plate_gain", "gain"): "a force's gain off by",
@@ -114,7 +114,7 @@ _TOLD = {
 
 def _limits(rows: pd.DataFrame) -> Iterator[str]:
     """The smallest limit of each fault that the sentence mentions."""
-    for (effect, parameter), words in _TOLD.items():
+    for (effect, parameter), words in _SHOWN.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
         for best in mine.sort_values("limit").head(1).to_dict("records"):
             if isfinite(best["limit"]):

@@ -16,7 +16,7 @@ from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, capital, listing, number, task_of
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM
+from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
@@ -42,10 +42,10 @@ class Ratios:
         errors = self.of_component[component]
         return (errors[method] / errors[RM]).to_numpy()
 
-    def over_rival(self, component: str) -> np.ndarray:
+    def over_best_other(self, component: str) -> np.ndarray:
         """(p,) of OM over those of the better of RM and RM+mass."""
         errors = self.of_component[component]
-        return (errors[OM] / errors[list(RIVALS)].min(axis="columns")).to_numpy()
+        return (errors[OM] / errors[list(ALTERNATIVES)].min(axis="columns")).to_numpy()
 
 
 def ratios_of(read: ReadValues) -> Ratios:
@@ -133,7 +133,7 @@ SHARED = (
     "(a few of very many may be coincidence):"
 )
 _MOST_NAMED = 12  # participants in one sentence
-_MOST_TOLD = 8  # causes
+_MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
 Cause = tuple[Candidate, ...]
@@ -170,7 +170,7 @@ def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     alike; what most people have comes first. The laboratory's faults are in its own part."""
     shared = [found for found in _found(people) if len(found.people) > 1]
     shared.sort(key=lambda found: -len(found.people))
-    said = [_told(found, people) for found in shared[:_MOST_TOLD]]
+    said = [_in_words(found, people) for found in shared[:_MOST_SAID]]
     left = len(shared) - len(said)
     return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
 
@@ -196,7 +196,7 @@ def _found(people: Sequence[Searched]) -> list[_Found]:
     return list(found.values())
 
 
-def _told(found: _Found, people: Sequence[Searched]) -> str:
+def _in_words(found: _Found, people: Sequence[Searched]) -> str:
     unsure = [person for person in found.people if person not in found.named_of]
     possibly = "possibly " if not found.named_of else ""
     asked = _asked(found, people)
@@ -212,7 +212,7 @@ def _told(found: _Found, people: Sequence[Searched]) -> str:
 
 
 def _asked(found: _Found, people: Sequence[Searched]) -> int:
-    """How many could have shown it: a recording of the same task was searched. Of standing, which is
+    """How many could have shown it: a recording of the same task was searched. Of quiet stance, which is
     no search, everybody counts."""
     tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
     of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}

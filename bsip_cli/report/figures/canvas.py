@@ -126,10 +126,10 @@ def runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def middle_of_longest(time_s: np.ndarray, flags: np.ndarray, seconds: float) -> slice:
     """Up to ``seconds`` from the middle of the longest interval where ``flags`` holds."""
-    stretches = runs(flags)
-    if not stretches:
+    intervals = runs(flags)
+    if not intervals:
         return slice(0, 0)
-    first, end = max(stretches, key=lambda pair: pair[1] - pair[0])
+    first, end = max(intervals, key=lambda pair: pair[1] - pair[0])
     spare = time_s[end - 1] - time_s[first] - seconds
     if spare <= 0.0:
         return slice(first, end)

@@ -10,8 +10,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills, ordered
 from bsip_cli.report.figures.canvas import (
     BLUE,
     FAINT,
@@ -32,47 +35,63 @@ from bsip_cli.statistics.samples import Z95
 
 # --- bars: errors cut into what makes them, residuals of markers, masses of segments ---------------
 
-COLOURS = (BLUE, "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#009E73", FAINT, "#8C510A")
-"""As those of the first page's bar: Okabe and Ito, which the colour-blind can distinguish."""
+_HEIGHT = 0.7  # of a bar, from one to the next
 _TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
-_FIXED = {"noise": ("#ffffff", ""), "unknown": ("#ffffff", "////")}
 
 
 @dataclass(frozen=True)
 class Whole:
-    """An error in words, and shares [%] that add up to 100, each with its label."""
+    """An error in words, and pieces whose shares [%] add up to 100."""
 
     label: str
-    shares: tuple[tuple[str, float], ...]
+    pieces: tuple[Piece, ...]
 
 
 @house_style()
-def error_bars(bars: Sequence[Whole], first: Sequence[str] = ()) -> Figure:
+def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
     """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
-    labels that get the first colours, as the first page's bar gives them."""
-    figure = new_figure(24.0 + 6.0 * len(bars))
+    pieces whose order, and hatching of faults, are those of the first page's bar."""
+    shown = {piece.label for bar in bars for piece in bar.pieces}
+    figure = new_figure(max(24.0, 14.0 + 2.2 * len(shown)) + 6.0 * len(bars))
     axes = figure.add_subplot()
-    labels = list(dict.fromkeys(label for bar in bars for label, _ in bar.shares))
-    ordinary = [one for one in dict.fromkeys((*first, *labels)) if one not in _FIXED]
-    order = [one for one in (*ordinary, *_FIXED) if one in labels]
+    fill = fills([*first, *(piece for bar in bars for piece in bar.pieces)])
     ends = np.zeros((len(bars), 2))  # left of zero, right of it
-    for label in order:
-        again, k = (0, 0) if label in _FIXED else divmod(ordinary.index(label), len(COLOURS))
-        colour, hatch = _FIXED.get(label) or (COLOURS[k], "||" * again)
-        shares = np.array([dict(bar.shares).get(label, 0.0) for bar in bars])
-        side = (shares > 0).astype(int)
-        start = ends[range(len(bars)), side]
-        style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": INK, "lw": 0.5}
-        axes.barh(range(len(bars)), shares, left=start, height=0.7, label=label, **style)
-        ends[range(len(bars)), side] += shares
+    handles: dict[str, Any] = {}
+    for label in (one for one in ordered(fill, (NOISE, UNKNOWN)) if one in shown):
+        shares = [sum(p.share for p in bar.pieces if p.label == label) for bar in bars]
+        handles[label] = _draw_shares(axes, np.array(shares), ends, fill[label])
     axes.axvline(0.0, color=INK, lw=0.9)
     axes.set_yticks(range(len(bars)), [bar.label for bar in bars])
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
     tidy(axes, grid="x")
-    handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper center", ncols=2, frameon=False, fontsize=7.5)
+    figure.legend(
+        list(handles.values()),
+        list(handles),
+        loc="outside upper center",
+        ncols=2,
+        frameon=False,
+        fontsize=7.5,
+        handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
+    )
     return figure
+
+
+def _draw_shares(axes: Axes, shares: np.ndarray, ends: np.ndarray, fill: Fill) -> tuple[Patch, ...]:
+    """Add a piece to each bar, several colours one above the other; return what stands for it in the
+    legend. ends (b, 2), changed : where each bar ends so far, left of zero and right of it."""
+    rows = np.arange(len(shares))
+    side = (shares > 0).astype(int)
+    start = ends[rows, side]
+    height = _HEIGHT / len(fill.colours)
+    patches = []
+    for k, colour in enumerate(fill.colours):
+        style: dict[str, Any] = {"facecolor": colour, "hatch": fill.hatch, "edgecolor": INK}
+        at = rows - _HEIGHT / 2 + (k + 0.5) * height
+        axes.barh(at, shares, left=start, height=height, lw=0.5, **style)
+        patches.append(Patch(lw=0.5, **style))
+    ends[rows, side] += shares
+    return tuple(patches)
 
 
 @house_style()
@@ -140,7 +159,7 @@ def segment_masses(data: pd.DataFrame) -> Figure:
     return figure
 
 
-# --- a dot per person: errors beside their yardsticks, and what identification gains --------------
+# --- a dot per person: errors and their yardsticks, and what identification gains -----------------
 
 
 _SPREAD = 0.28
@@ -149,7 +168,7 @@ _SPREAD = 0.28
 @dataclass(frozen=True, eq=False)
 class Strip:
     """One quantity of all persons: ``values`` (p,), NaN where not known; ``far`` (p,) those that are
-    named beside their dot."""
+    named next to their dot; ``end`` of the axis, where a triangle stands for what is beyond."""
 
     title: str
     values: np.ndarray
@@ -157,6 +176,7 @@ class Strip:
     far: np.ndarray
     good: float
     limit: float
+    end: float
 
 
 @house_style()
@@ -176,16 +196,27 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
     axes.axhline(strip.limit, color="#b30000", lw=1.2)
     colours = np.where(strip.far[known], ORANGE, BLUE)
     many = len(known) > MANY_PEOPLE
-    axes.scatter(offsets, strip.values[known], s=8 if many else 22, c=colours, rasterized=many)
+    beyond = strip.values[known] > strip.end
+    for marker, mine, most in (("o", ~beyond, strip.end), ("^", beyond, 0.98 * strip.end)):
+        axes.scatter(
+            offsets[mine],
+            np.minimum(strip.values[known][mine], most),
+            s=8 if many else 22,
+            c=colours[mine],
+            marker=marker,
+            rasterized=many,
+        )
     for x, k in zip(offsets, known, strict=True):
         if strip.far[k]:
-            place = (x, float(strip.values[k]))
-            axes.annotate(plain(strip.names[k]), place, (5, 3), textcoords="offset points", size=7)
+            value, name = float(strip.values[k]), plain(strip.names[k])
+            name, lift = (f"{name}: {value:.3g}", -9) if value > strip.end else (name, 3)
+            place = (x, min(value, strip.end))
+            axes.annotate(name, place, (5, lift), textcoords="offset points", size=7)
     if len(known):
-        axes.hlines(np.median(strip.values[known]), -0.42, 0.42, color=INK, lw=1.4)
+        middle = min(float(np.median(strip.values[known])), strip.end)
+        axes.hlines(middle, -0.42, 0.42, color=INK, lw=1.4)
     axes.set_xlim(-0.6, 0.9)
-    top = max([1.15 * strip.limit, *(1.1 * strip.values[known])])
-    axes.set_ylim(0.0, top)
+    axes.set_ylim(0.0, strip.end)
     axes.set_xticks([])
     axes.set_title(strip.title, fontsize=8, loc="left")
     tidy(axes)

@@ -28,7 +28,7 @@ from bsip_cli.report.verdict import (
 from bsip_cli.report.words import MISSING, number, percent
 
 _NEAREST = 4  # rejected causes that are listed
-_TOLD_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
+_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
 _FAR = 20.0  # times the largest usual size: not seen at all
 
 
@@ -104,10 +104,10 @@ def limit_blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[Bloc
 def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
     """Causes, or parts of them, that these recordings do not show at all; what was found has no
     limit either."""
-    told = set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
+    reported = set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
     least: dict[str, dict[tuple[str, str], float]] = {}
     for r in detection.to_dict("records"):
-        if r["effect"] not in told:
+        if r["effect"] not in reported:
             parts, part = least.setdefault(r["effect"], {}), (r["target"], r["parameter"])
             parts[part] = min(r["limit"], parts.get(part, inf))
     never = []
@@ -115,7 +115,7 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
         hidden = [part for part, size in sizes.items() if not isfinite(size)]
         if len(hidden) == len(sizes):
             never.append(effect_title(effect))
-        elif hidden and effect in _TOLD_BY_PART:
+        elif hidden and effect in _BY_PART:
             places = ((place_label(effect, at), parameter_label(effect, one)) for at, one in hidden)
             words = "; ".join(", ".join(filter(None, part)) for part in places)
             never.append(f"{effect_title(effect)} ({words})")

@@ -159,8 +159,8 @@ def _findings(record: ParticipantRecord) -> Iterator[Block]:
     lines = []
     for level, check, action in sorted(found, key=lambda key: _LEVELS.index(key[0])):
         trials = found[level, check, action]
-        told = set().union(*trials.values())
-        what = told.pop() if len(told) == 1 else count(len(told), "finding")
+        findings = set().union(*trials.values())
+        what = findings.pop() if len(findings) == 1 else count(len(findings), "finding")
         done = f" ({action})" if action else ""
         place = f"{check.replace('_', ' ')}, {level}, in {listing(list(trials))}"
         lines.append(f"{place}: {what}{done}")

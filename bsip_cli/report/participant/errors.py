@@ -12,7 +12,7 @@ from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Sectio
 from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.errors import (
-    LEAST_TOLD_SIZE,
+    LEAST_REPORTED_SIZE,
     Gain,
     gains_of,
     one_number_alone,
@@ -78,7 +78,7 @@ def _over_time(record: ParticipantRecord) -> Iterator[Block]:
 
 def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
     """The trial with most compared frames that OM did not see, if any, and up to ten seconds of its
-    longest stretch."""
+    longest interval."""
     own = {trial.stem for trial in record.identification_trials()}
     found = [
         (trial.stem not in own, int(flags_of(trial.reconstruction, "valid").sum()), trial)
@@ -105,13 +105,13 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     bars = []
     for component in COMPONENTS:
         size, unit = size_of(record.budget, component)
-        if size >= LEAST_TOLD_SIZE:
-            parts = tuple((p.label, p.share) for p in pieces(record.budget, component, found))
+        if size >= LEAST_REPORTED_SIZE:
+            parts = pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
         yield Picture(
-            error_bars(bars, [piece.label for piece in overall_pieces(record.budget, found)]),
+            error_bars(bars, overall_pieces(record.budget, found)),
             "error_budget",
             "What makes the error of the table's parameters (RM) in each component, and how large it "
             "is, over all recordings.",

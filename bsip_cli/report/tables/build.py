@@ -26,7 +26,7 @@ from bsip_cli.report.tables.model import (
     unit_label,
 )
 from bsip_cli.report.tables.paired import REASON, SHORT
-from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, all_reasons
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 # --- table 3: sway of the measured and the simulated centre of pressure ---------------------------
@@ -136,8 +136,8 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
         of_topic["n"] = results.find(topic, "paired_t").n
         tests = results.values(topic, of_error) | results.values(r, of_r)
         tests["label"] = f"{name} [{unit_label(topic.unit)}]"
-        tests["reason"] = joined(results.reasons(topic), results.reasons(r))
-        for method in SHORT:  # tests stand in OM's row; those of its rivals leave them empty
+        tests["reason"] = all_reasons(results.reasons(topic), results.reasons(r))
+        for method in SHORT:  # tests stand in OM's row; those of other methods leave them empty
             own = tests if method == OM else dict.fromkeys(tests, "")
             of_method = _means_of_six(results, topic, method)
             values = {**of_topic, "method": method, **own, **of_method}
@@ -160,7 +160,7 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
 
 
 def _errors_of_six() -> Iterator[Column]:
-    """Tests of the RMSE, of OM against each rival."""
+    """Tests of the RMSE, of OM against each other method."""
     for one in paired.smaller_error("n_paired", "sign.n"):
         yield one
         name, pair = one.fields[0], one.of[0][2:]
@@ -215,7 +215,7 @@ def build_tables(
     fitted_on: Sequence[Mapping] = (),
     missing: Sequence[Mapping] = (),
 ) -> tuple[Table, ...]:
-    """The six tables as data, and the first four beside the published values.
+    """The six tables as data, and the first four next to the published values.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def build_tables(
             model.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
-    return (*tables, *(published.beside(tag, of_table[tag]) for tag in IN_PRINT))
+    return (*tables, *(published.next_to_published(tag, of_table[tag]) for tag in IN_PRINT))
 
 
 def folder(out: Path) -> Path:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from math import isnan
 from pathlib import Path
 
-from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, all_reasons
 from bsip_cli.statistics.methods import OM, RM
 
 Cell = str | float | int
@@ -119,7 +119,7 @@ class Results:
 
     def reasons(self, topic: Topic) -> str:
         """Why tests on the topic are not possible, each reason once."""
-        return joined(*(row.reason for row in self.about(topic)))
+        return all_reasons(*(row.reason for row in self.about(topic)))
 
 
 # --- numbers as text ------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}
 """Methods in the names of CSV columns."""
 
 _PREFIX = {RM: "", RM_MASS: "rm_mass_"}
-"""Of the CSV columns with tests of OM against a rival."""
+"""Of the CSV columns with tests of OM against another method."""
 
 _P = {RM: "p", RM_MASS: "p OM, RM+mass"}
 """Headings of the columns that carry the stars."""
@@ -52,10 +52,10 @@ def means(test: str = "paired_t") -> tuple[Column, ...]:
             f"{name}.mean_{side} {name}.sd_{side}",
             f"{method} M(SD)",
             mean_sd(2),
-            (OM, rival),
+            (OM, other),
             in_row_unit=True,
         )
-        for method, name, side, rival in numbers
+        for method, name, side, other in numbers
     )
 
 
@@ -93,9 +93,9 @@ def against_rm_mass(criteria: Criteria) -> tuple[Column, ...]:
 
 
 def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[Column]:
-    for rival, before in _PREFIX.items():
-        counts = f"{before}om_smaller {SHORT[rival]}_smaller {before}{n}"
-        heading, pair = f"smaller error OM : {rival}", (OM, rival)
+    for other, before in _PREFIX.items():
+        counts = f"{before}om_smaller {SHORT[other]}_smaller {before}{n}"
+        heading, pair = f"smaller error OM : {other}", (OM, other)
         yield column(counts, f"sign.count_a sign.count_b {of_n}", heading, counts_of, pair)
         yield column(f"{before}om_smaller_share", "sign.effect_size", pair=pair)
         yield column(f"{before}sign_test_p", "sign.p_value", pair=pair)
@@ -104,8 +104,8 @@ def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[Column]:
 def stars(results: Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
     """Of both p."""
     return {
-        heading: model.star(results.find(topic, "paired_t", OM, rival), criteria.alpha)
-        for rival, heading in _P.items()
+        heading: model.star(results.find(topic, "paired_t", OM, other), criteria.alpha)
+        for other, heading in _P.items()
     }
 
 

@@ -1,4 +1,4 @@
-"""What the papers print, what of it cannot be true, and this study beside it."""
+"""What the papers print, what of it cannot be true, and this study next to it."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def audited(paper: Paper) -> Table:
     return Table(f"{paper.key}_audit", title, columns, rows, (paper.citation,))
 
 
-def name_beside(tag: str) -> str:
-    """The stem of the file that `beside` fills."""
+def comparison_name(tag: str) -> str:
+    """The stem of the file that `next_to_published` fills."""
     return f"{tag}_beside_{COMPARED}"
 
 
-def beside(tag: str, results: Results) -> Table:
-    """This study's means beside the printed ones; ``tag`` is table1 to table4."""
+def next_to_published(tag: str, results: Results) -> Table:
+    """This study's means next to the printed ones; ``tag`` is table1 to table4."""
     paper = load_paper(COMPARED)
     table = paper.table(int(tag.removeprefix("table")))
     meant = table.as_meant()
@@ -85,8 +85,8 @@ def beside(tag: str, results: Results) -> Table:
         marks = {f"{method} in print": _MOVED for method in moved}
         rows.append(Row(values | _found_here(tag, results, row), marks=marks))
     return Table(
-        name_beside(tag),
-        f"Table {table.number} of {paper.name} beside this study. {table.about}: mean "
+        comparison_name(tag),
+        f"Table {table.number} of {paper.name} next to this study. {table.about}: mean "
         "(standard deviation).",
         tuple(columns),
         tuple(rows),

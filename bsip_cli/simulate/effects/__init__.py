@@ -14,7 +14,7 @@ from bsip_cli.simulate.options import Asked, StudyOptions
 
 EFFECTS = {name: KINDS[name] for name in TABLE}
 NO_TARGET = ("", "-")
-EFFECT = 4  # the stream of random numbers, beside those of `study`
+EFFECT = 4  # the stream of random numbers, next to those of `study`
 
 
 def pair_up(

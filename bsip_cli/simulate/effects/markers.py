@@ -20,7 +20,7 @@ SLIP_S = 0.05
 SOFT = 0.1  # of the window of a slide, in which it speeds up, and slows down
 COMPANIONS = 3
 CLOSE_PAIRS = 5
-LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
+LEAST_FRAMES = 15  # a shorter interval between gaps is not smoothed
 
 
 @dataclass(frozen=True, eq=False)

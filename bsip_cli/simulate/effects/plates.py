@@ -191,7 +191,7 @@ class PlateDrift(ChannelFault, name="plate_drift"):
 
 @dataclass(frozen=True, eq=False)
 class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
-    """Channel `to` shows size times channel `source` besides its own."""
+    """Channel `to` shows size times channel `source` plus its own."""
 
     source: str
     to: str

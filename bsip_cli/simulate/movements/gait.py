@@ -48,7 +48,7 @@ class Gait:
 
 
 def walking(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
-    """A stretch of walking around one stance on the plate."""
+    """A part of walking around one stance on the plate."""
     size = person.stature_m / 1.7
     step_s = rng.uniform(0.50, 0.53)
     gait = Gait(
@@ -79,7 +79,7 @@ def walking(person: Person, rng: np.random.Generator, duration_s: float, _ball: 
 
 
 def running(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
-    """A stretch of running around one stance on the plate, with flight before and after."""
+    """A part of running around one stance on the plate, with flight before and after."""
     size = person.stature_m / 1.7
     step_s = round(rng.uniform(0.335, 0.35), 3)
     gait = Gait(

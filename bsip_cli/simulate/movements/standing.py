@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bsip_cli.simulate.numerics import glide, soft_polyline, step, wander, window
+from bsip_cli.simulate.numerics import glide, slow_drift, soft_polyline, step, window
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import (
     FootSketch,
@@ -257,7 +257,7 @@ def sequence(person: Person, rng: np.random.Generator, duration_s: float, _ball:
     calm = window(sketch.t_s, 0.0, duration_s, 0.8)
     for angle in sketch.angles.values():
         for column in np.atleast_2d(angle.T):
-            column += calm * wander(sketch.t_s, rng, np.deg2rad(2.0), 0.2, 1.0)
+            column += calm * slow_drift(sketch.t_s, rng, np.deg2rad(2.0), 0.2, 1.0)
     moved_a_little(sketch, rng, 0.2)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.35)
 

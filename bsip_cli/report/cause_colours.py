@@ -1,0 +1,80 @@
+"""One colour for each kind of cause in every report: Okabe and Ito, which the colour-blind can
+distinguish."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+FAULT, REST, NOISE, UNKNOWN = "fault", "rest", "noise", "unknown"
+COLOURS = {
+    "inertial_parameters": "#0072B2",
+    "joint_centres": "#56B4E9",
+    "marker_places": "#009E73",
+    "soft_tissue": "#E69F00",
+    "trunk_and_shoulders": "#F0E442",
+    "smoothing": "#CC79A7",
+    FAULT: "#D55E00",
+    REST: "#d4d4d4",
+    NOISE: "#ffffff",
+    UNKNOWN: "#ffffff",
+}
+"""By term of the error budget; all faults have one, and differ by their hatching."""
+
+HATCHES = ("", "||", "--", "..")
+_INK = "#1c1c1c"
+_CSS = {
+    "": "{colour}",
+    "||": f"repeating-linear-gradient(90deg, {{colour}} 0 4px, {_INK} 4px 5px)",
+    "--": f"repeating-linear-gradient(0deg, {{colour}} 0 4px, {_INK} 4px 5px)",
+    "..": f"radial-gradient({_INK} 1px, {{colour}} 1.5px) 0 0 / 6px 6px",
+    "////": f"repeating-linear-gradient(45deg, {{colour}} 0 4px, {_INK} 4px 6px)",
+}
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What some terms, taken together where they look alike, make of an error [%]; kinds : of
+    these, keys of ``COLOURS``."""
+
+    label: str
+    share: float
+    kinds: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Fill:
+    """Colours one above the other, and a hatching."""
+
+    colours: tuple[str, ...]
+    hatch: str
+
+    def css(self) -> str:
+        """As the background of an element."""
+        if len(self.colours) == 1:
+            return _CSS[self.hatch].format(colour=self.colours[0])
+        part = 100 / len(self.colours)
+        stops = (f"{c} {k * part:.0f}% {(k + 1) * part:.0f}%" for k, c in enumerate(self.colours))
+        return f"linear-gradient({', '.join(stops)})"
+
+
+def fills(pieces: Iterable[Piece]) -> dict[str, Fill]:
+    """By label, in the order in which the labels come first."""
+    faults = 0
+    found: dict[str, Fill] = {}
+    for piece in pieces:
+        if piece.label in found:
+            continue
+        hatch = "////" if piece.kinds == (UNKNOWN,) else ""
+        if piece.kinds == (FAULT,):
+            hatch = HATCHES[faults % len(HATCHES)]
+            faults += 1
+        found[piece.label] = Fill(tuple(COLOURS[kind] for kind in piece.kinds), hatch)
+    return found
+
+
+def ordered(labels: Iterable[str], last: Sequence[str]) -> Iterator[str]:
+    """Each label once, those of ``last`` at the end."""
+    known = dict.fromkeys(labels)
+    yield from (one for one in known if one not in last)
+    yield from (one for one in last if one in known)

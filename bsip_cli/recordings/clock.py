@@ -111,7 +111,7 @@ def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
     return gains
 
 
-def log_odds_of(of_trials: Sequence[np.ndarray], times: float) -> float:
+def log_odds_of(of_trials: Sequence[Sequence[float]], times: float) -> float:
     """Of all trials so many times as fast as they are read, from what `PACES` are of each."""
     nearest = int(np.argmin(np.abs(PACES - times)))
     return float(np.sum([one[nearest] for one in of_trials]))

@@ -86,7 +86,7 @@ class SessionReading:
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
-    of_paces: Sequence[np.ndarray] = field(default=(), compare=False)
+    of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
 
     def with_delays(self) -> float:
         """Logarithm of the posterior, but for a constant, rare delays counted."""
@@ -167,7 +167,7 @@ def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
         paces=chosen.of.paces(limits.corrected_percent),
         maybe_paces=chosen.of.paces(100 - limits.believed_percent),
         log_posterior=chosen.of.log_posterior,
-        of_paces=tuple(chosen.of.of_paces.values()),
+        of_paces=tuple(one.tolist() for one in chosen.of.of_paces.values()),
     )
 
 

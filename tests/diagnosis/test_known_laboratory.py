@@ -37,7 +37,7 @@ def test_faults_that_offset_each_other_are_not_taken_off_one_by_one():
     mean = np.array([1.4, 0.0, -35.0, 35.1])
     together = 40.0 * np.array([[0.0, 0.0, 1.0, -1.0]]).T
     root = np.column_stack([0.1 * np.eye(4), together])
-    known = Known(coordinates, mean, root, rows())
+    known = Known(coordinates, mean, root, rows(), {})
     trial = SimpleNamespace(scene=moving(), name="a")
     (cause,) = known.causes([trial])
     parameters = SHIFT[0].effect, "1"
@@ -54,7 +54,7 @@ def test_an_offset_is_not_where_ingest_has_taken_it_off():
     row = number | {"parameter": "offset", "estimate": 9.0, "ci_low": 8.0, "ci_high": 10.0}
     table = pd.DataFrame([row | {"persons": 7, "probability": 0.99}])
     offset = Coordinate("plate_zero", "1 fx", "offset")
-    known = Known((offset,), np.array([0.9]), 0.1 * np.eye(1), table)
+    known = Known((offset,), np.array([0.9]), 0.1 * np.eye(1), table, {})
     trials = [SimpleNamespace(scene=scene, name="a"), SimpleNamespace(scene=zeroed, name="b")]
     (cause,) = known.causes(trials)
     assert cause["trials"] == ["a"] and cause["values"] == pytest.approx([9.0])

@@ -29,10 +29,9 @@ import numpy as np
 from benchmarks.measure import ROOT, machine, markdown, run_child
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.base_parameters import find_basis
-from bsip_cli.dynamics.regressor import move_moments, predicted_wrench, rotations_of
+from bsip_cli.dynamics.ground_wrench import move_moments, predicted_wrench, rotations_of
 from bsip_cli.identification.base import estimate
-from bsip_cli.identification.equations import accumulate, even_noise
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.problem import Problem, accumulate, even_noise
 from tests.identification.synthetic_identification import motion, recording, world
 
 CUTOFF_HZ = load_config([]).identify.cutoff_hz

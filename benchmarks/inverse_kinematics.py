@@ -24,9 +24,8 @@ from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown
 from benchmarks.moving_person import movement, noisy_markers, sample_person, standing
 from bsip_cli.body.person import Person
 from bsip_cli.config import load_config
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.motion.inverse_kinematics import Poses, solve_poses, tree_of
-from bsip_cli.motion.jacobian import model_markers
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.motion.inverse_kinematics import Poses, model_markers, solve_poses, tree_of
 from bsip_cli.motion.smoothing import smooth_motion
 
 NOISE_M = 0.005

@@ -40,8 +40,13 @@ from bsip_cli.diagnosis.laboratory import (
     scales_of,
     sums_of,
 )
-from bsip_cli.diagnosis.laboratory_deviations import deviations_of
-from bsip_cli.diagnosis.laboratory_search import Laboratory, causes_of, laboratory_of, verdicts_of
+from bsip_cli.diagnosis.laboratory_search import (
+    Laboratory,
+    causes_of,
+    deviations_of,
+    laboratory_of,
+    verdicts_of,
+)
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
 from bsip_cli.stages.known_laboratory import information_in
 

@@ -12,10 +12,9 @@ from benchmarks.measure import ROOT
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.calibration import calibrate
-from bsip_cli.motion.inverse_kinematics import neutral, tree_of
-from bsip_cli.motion.jacobian import model_markers
+from bsip_cli.motion.inverse_kinematics import model_markers, neutral, tree_of
 from bsip_cli.recordings.read import read_recording
 
 _STATIC = ROOT / "sample_data" / "sub-01" / "sub-01_task-static.c3d"

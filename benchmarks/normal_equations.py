@@ -15,11 +15,10 @@ import pinocchio as pin
 from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
 from benchmarks.moving_person import movement, sample_person
 from bsip_cli.config import load_config
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.identification import consistent
 from bsip_cli.identification.consistent import fit_with_weights, minimise, objective_of, terms_of
-from bsip_cli.identification.equations import Recording, accumulate, even_noise
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.problem import Problem, Recording, accumulate, even_noise
 from tests.identification import synthetic_identification
 from tests.identification.test_logdet_fit import by_clarabel
 

@@ -17,8 +17,8 @@ import numpy as np
 from benchmarks.measure import markdown
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.commands.export import Request, export_session
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.dynamics.joint_moments import Spread, joint_loads
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import segment_motion
 from bsip_cli.pipeline import Stage
 from bsip_cli.running.session import open_study

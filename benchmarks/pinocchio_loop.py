@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.motion.jacobian import subtrees
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.motion.inverse_kinematics import subtrees
 
 _STEPS = 20
 

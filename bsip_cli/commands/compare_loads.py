@@ -15,8 +15,8 @@ from bsip_cli.body.inertia import PARAMETERS, UNITS, from_phi, readable_jacobian
 from bsip_cli.body.person import Person
 from bsip_cli.errors import BadDataError, BsipError, UsageError, printable
 from bsip_cli.identification.difference import change_of_segments, difference
-from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.prior import Prior
+from bsip_cli.identification.problem import Problem
 from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.model import Column, Row, Table

@@ -24,11 +24,10 @@ from bsip_cli.diagnosis.cause import (
 )
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
-from bsip_cli.effects.plates import ALL, PlateZero, loaded_plates
+from bsip_cli.effects.plates import ALL, Delay, PlateZero, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash

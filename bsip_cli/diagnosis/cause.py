@@ -8,9 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bsip_cli.effects.clocks import Delay, Sized, joint_change, joint_delay_s
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.plates import ALL, PlateRotation, loaded_plates, plate_of
+from bsip_cli.effects.plates import (
+    ALL,
+    Delay,
+    PlateRotation,
+    Sized,
+    joint_change,
+    joint_delay_s,
+    loaded_plates,
+    plate_of,
+)
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.statistics.methods import OM
 

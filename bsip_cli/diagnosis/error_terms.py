@@ -15,12 +15,12 @@ from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.hypothesis import candidates_of
-from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+from bsip_cli.dynamics.ground_wrench import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.joints import JointCentre
+from bsip_cli.effects.plates import Delay
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"

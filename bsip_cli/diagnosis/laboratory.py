@@ -28,8 +28,8 @@ from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
-from bsip_cli.effects.clocks import ClockDrift, SyncOffset
 from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.plates import ClockDrift, SyncOffset
 
 _STEPS = 100  # of expectation and maximisation, at most
 _STEADY = 0.01  # change of every scale

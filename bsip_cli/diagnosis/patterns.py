@@ -13,10 +13,9 @@ from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.dynamics.regressor import move_moments
-from bsip_cli.effects.clocks import Delay
+from bsip_cli.dynamics.ground_wrench import move_moments
 from bsip_cli.effects.effect import Effect, Parameter, Reported
-from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
+from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, Delay, unit_of
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 from bsip_cli.segments import in_words
 

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from bsip_cli.body.inertia import PARAMETERS, UNITS
-from bsip_cli.dynamics.regressor import wrench_regressor
+from bsip_cli.dynamics.ground_wrench import wrench_regressor
 
 _STATES = 80
 _TOLERANCE = 1e-9

@@ -24,8 +24,7 @@ import numpy as np
 
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import skew
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, skew
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 from bsip_cli.segments import without_side
 

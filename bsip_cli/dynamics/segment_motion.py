@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import SYMMETRIC
-from bsip_cli.dynamics.regressor import rotations_of, skew
+from bsip_cli.dynamics.ground_wrench import rotations_of, skew
 
 UP = np.array([0.0, 0.0, 1.0])
 _FREE = 7  # entries in q of a joint that also shifts

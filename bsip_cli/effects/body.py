@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_phi
-from bsip_cli.dynamics.cop import centre_of_pressure
+from bsip_cli.dynamics.ground_wrench import centre_of_pressure
 from bsip_cli.dynamics.segment_motion import UP
 from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz
 from bsip_cli.effects.scene import Scene

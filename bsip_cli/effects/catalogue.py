@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bsip_cli.effects import body, clocks, frames, joints, loads, markers, plates
+from bsip_cli.effects import body, frames, joints, loads, markers, plates
 from bsip_cli.effects.effect import Effect
 
 CATALOGUE: tuple[Effect, ...] = (
-    clocks.SyncOffset(),
-    clocks.ClockDrift(),
+    plates.SyncOffset(),
+    plates.ClockDrift(),
     plates.PlateTranslation(),
     plates.PlateRotation(),
     plates.PlateGain(),

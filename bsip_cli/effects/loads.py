@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.dynamics.regressor import skew
+from bsip_cli.dynamics.ground_wrench import skew
 from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz, parts_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words

@@ -14,12 +14,20 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, resample, sosfiltfilt
 
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.ground_wrench import (
+    WrenchResponse,
+    pinocchio_model,
+    predicted_wrench,
+    wrench_response,
+)
 from bsip_cli.dynamics.segment_motion import Point, SegmentMotion, segment_motion
-from bsip_cli.dynamics.wrench_response import WrenchResponse, wrench_response
-from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.motion.jacobian import PoseResponse, marker_trust, model_markers, pose_responses
+from bsip_cli.motion.inverse_kinematics import (
+    PoseResponse,
+    marker_trust,
+    model_markers,
+    pose_responses,
+    tree_of,
+)
 
 FINER = 4  # samples per frame of the wrench between frames
 SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import Estimate, Problem
 
 # The table enters with this part of its weight, so that a combination the motion never excited
 # gets a large standard deviation instead of stopping the rest.

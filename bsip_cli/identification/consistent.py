@@ -18,8 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from bsip_cli.body.inertia import second_moments
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification.equations import INSTRUMENT_GROUPS
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import INSTRUMENT_GROUPS, Estimate, Problem
 
 # --- segments as pseudo-inertias, and the log-det divergence between them -------------------------
 

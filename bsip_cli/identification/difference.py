@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import Estimate, Problem
 
 
 @dataclass(frozen=True, eq=False)

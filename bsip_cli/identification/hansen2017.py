@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import Estimate, Problem
 
 _SMALLEST_MASS = 0.05  # of the table's
 

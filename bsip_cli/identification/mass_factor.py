@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import Estimate, Problem
 from bsip_cli.statistics.samples import Z95
 
 _ROUNDS = 20  # of weights and number

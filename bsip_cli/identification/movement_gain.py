@@ -12,8 +12,8 @@ import pinocchio as pin
 
 from bsip_cli.body.person import Person
 from bsip_cli.config import shipped
-from bsip_cli.dynamics.regressor import wrench_regressor
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.dynamics.ground_wrench import wrench_regressor
+from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import Beforehand, beforehand
 
 # --- movements that a person can be asked for, and the motion of each in this body ----------------

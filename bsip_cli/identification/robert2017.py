@@ -18,8 +18,8 @@ import numpy as np
 from scipy import sparse
 
 from bsip_cli.identification.base import base_parameters
-from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.hansen2017 import smallest
+from bsip_cli.identification.problem import Estimate, Problem
 
 _SMALLEST_MASS = 0.05  # of the table's
 

@@ -9,8 +9,8 @@ from scipy.linalg import eigh
 from scipy.stats import chi2
 
 from bsip_cli.body.inertia import from_phi, readable_jacobian
-from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.prior import Prior
+from bsip_cli.identification.problem import Estimate, Problem
 
 # --- how well the motion excited the inertial parameters ------------------------------------------
 

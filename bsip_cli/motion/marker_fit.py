@@ -9,8 +9,13 @@ from functools import cached_property, partial
 import numpy as np
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import model_markers, tree_of
-from bsip_cli.motion.jacobian import marker_trust, pose_columns, subtrees
+from bsip_cli.motion.inverse_kinematics import (
+    marker_trust,
+    model_markers,
+    pose_columns,
+    subtrees,
+    tree_of,
+)
 
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0

@@ -17,11 +17,12 @@ from bsip_cli.motion.inverse_kinematics import (
     Poses,
     concatenated,
     model_markers,
+    pose_columns,
     solve_poses,
     solve_trial,
+    subtrees,
     tree_of,
 )
-from bsip_cli.motion.jacobian import pose_columns, subtrees
 from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
 

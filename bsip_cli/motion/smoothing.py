@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt, welch
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.jacobian import coordinate_covariance, marker_residuals
+from bsip_cli.motion.inverse_kinematics import coordinate_covariance, marker_residuals
 from bsip_cli.motion.splines import SkinNoise, SmoothSignal, bridged, noise_level, smooth
 
 # --- how much the skin swings against the bones, from the residuals of the inverse kinematics -----

@@ -11,19 +11,19 @@ import pandas as pd
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.base_parameters import find_basis
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.dynamics.lowpass import valid_intervals
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.identification.equations import (
+from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
+from bsip_cli.identification.problem import (
+    Estimate,
     Instruments,
+    Problem,
     Recording,
     accumulate,
     even_noise,
     noise_of,
     residual_series,
 )
-from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, spread_names
 from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, load_phi

@@ -15,11 +15,10 @@ from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.identification.base import base_parameters
-from bsip_cli.identification.equations import Recording
-from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.movement_gain import advice
+from bsip_cli.identification.problem import Estimate, Problem, Recording
 from bsip_cli.identification.uncertainty import (
     RARE,
     Excitation,

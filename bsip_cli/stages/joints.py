@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.artifacts import table_of
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import Cause, corrected_plates, is_of_the_forces, method_of
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.dynamics.joint_moments import (
     Ground,
     JointLoads,
@@ -22,13 +23,12 @@ from bsip_cli.dynamics.joint_moments import (
     of_accelerations,
 )
 from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 from bsip_cli.effects.body import SegmentInertia
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.jacobian import coordinate_covariance
+from bsip_cli.motion.inverse_kinematics import coordinate_covariance
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit

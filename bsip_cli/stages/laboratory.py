@@ -16,13 +16,14 @@ import pandas as pd
 
 from bsip_cli.diagnosis.findings import Number, interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
-from bsip_cli.diagnosis.laboratory_deviations import Deviation, deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Cause,
+    Deviation,
     Laboratory,
     Size,
     Verdict,
     causes_of,
+    deviations_of,
     laboratory_of,
     verdicts_of,
 )

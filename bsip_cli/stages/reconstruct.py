@@ -16,10 +16,13 @@ from bsip_cli.artifacts import table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
+from bsip_cli.dynamics.ground_wrench import (
+    anterior_and_right,
+    centre_of_pressure,
+    pinocchio_model,
+    predicted_wrench,
+)
 from bsip_cli.dynamics.lowpass import lowpass_operator, valid_intervals
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of

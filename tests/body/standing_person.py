@@ -14,7 +14,7 @@ import pinocchio as pin
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.calibration import Calibration, calibrate
 
 HEIGHT_M = 1.77

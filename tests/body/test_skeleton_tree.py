@@ -2,7 +2,7 @@ import pytest
 
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import shipped
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.errors import UsageError
 from bsip_cli.segments import SEGMENTS
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.diagnosis.cause import Blocks, Cause, change_by, method_of, unseen_change_by
-from bsip_cli.effects.clocks import SyncOffset
-from bsip_cli.effects.plates import PlateZero
+from bsip_cli.effects.plates import PlateZero, SyncOffset
 from tests.effects.moving_scene import moving
 
 BLOCKS = Blocks(first=3, start_s=0.1, block_s=2.0, folds=5)

@@ -16,10 +16,9 @@ from bsip_cli.diagnosis.cause import (
     corrected_wrench,
     is_of_the_forces,
 )
-from bsip_cli.effects.clocks import ClockDrift, Delay, SyncOffset
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.loads import AddedMass
-from bsip_cli.effects.plates import PlateRotation, PlateZero
+from bsip_cli.effects.plates import ClockDrift, Delay, PlateRotation, PlateZero, SyncOffset
 from bsip_cli.effects.scene import Scene
 from tests.effects.moving_scene import moving
 

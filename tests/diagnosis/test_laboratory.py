@@ -18,10 +18,10 @@ from bsip_cli.diagnosis.laboratory import (
     scales_of,
     sums_of,
 )
-from bsip_cli.diagnosis.laboratory_deviations import deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Laboratory,
     causes_of,
+    deviations_of,
     laboratory_of,
     verdicts_of,
 )

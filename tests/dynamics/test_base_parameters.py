@@ -5,8 +5,7 @@ import pinocchio as pin
 import pytest
 
 from bsip_cli.dynamics.base_parameters import expressions, find_basis, random_regressor
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import wrench_regressor
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, wrench_regressor
 from bsip_cli.segments import SEGMENTS
 from tests.body.standing_person import standing, tilted_person
 

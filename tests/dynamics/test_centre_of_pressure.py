@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
+from bsip_cli.dynamics.ground_wrench import anterior_and_right, centre_of_pressure
 
 
 def wrench_at(point, force, free_moment=0.0):

@@ -6,9 +6,9 @@ import pytest
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import (
+from bsip_cli.dynamics.ground_wrench import (
     move_moments,
+    pinocchio_model,
     predicted_wrench,
     regressor_blocks,
     rotations_of,

@@ -13,9 +13,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.dynamics.joint_moments import Ground, Spread, axes_of, joint_loads, of_accelerations
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
 from tests.body.standing_person import Swing, joint_frames, standing, with_girdle
 from tests.exports.exported_person import identified_person
 

@@ -9,8 +9,8 @@ import pytest
 
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
 from bsip_cli.body.exports.osim import osim_text
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.dynamics.joint_moments import joint_loads
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from tests.body.standing_person import Swing, joint_frames, standing
 from tests.dynamics.test_joint_moments import KNOWN, feet, phi_of
 from tests.exports.exported_person import identified_person

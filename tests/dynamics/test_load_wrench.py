@@ -6,8 +6,7 @@ import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import load_parameters
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from tests.body.standing_person import Swing, standing
 
 

@@ -7,10 +7,14 @@ import pytest
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
-from bsip_cli.dynamics.pinocchio_model import bodies_of, pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
+from bsip_cli.dynamics.ground_wrench import (
+    bodies_of,
+    pinocchio_model,
+    predicted_wrench,
+    wrench_regressor,
+    wrench_response,
+)
 from bsip_cli.dynamics.segment_motion import segment_motion
-from bsip_cli.dynamics.wrench_response import wrench_response
 from tests.body.standing_person import Swing, standing, with_girdle
 from tests.effects.moving_scene import phi_of
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.effects.scene import Plate, Scene
 from tests.body.standing_person import Swing, standing
 

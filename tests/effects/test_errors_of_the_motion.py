@@ -17,13 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.effects.joints import BELOW, JointCentre, MissingJoint
 from bsip_cli.effects.markers import CORNER, MarkerShift, MarkerSwap, OverSmoothing, step
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.inverse_kinematics import solve_trial
-from bsip_cli.motion.jacobian import marker_residuals
+from bsip_cli.motion.inverse_kinematics import marker_residuals, solve_trial
 from tests.body.standing_person import markers_of, standing
 from tests.effects.moving_scene import RATE_HZ, derivatives, moving, phi, rms, scene_of
 

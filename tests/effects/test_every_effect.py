@@ -8,7 +8,7 @@ import pytest
 from bsip_cli.effects.body import WobblingMass
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.jacobian import marker_residuals
+from bsip_cli.motion.inverse_kinematics import marker_residuals
 from tests.body.standing_person import standing
 from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
 from tests.effects.moving_scene import moving

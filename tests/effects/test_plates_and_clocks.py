@@ -10,18 +10,18 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.dynamics.cop import centre_of_pressure
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.effects.clocks import ClockDrift, SyncOffset, joint_change
+from bsip_cli.dynamics.ground_wrench import centre_of_pressure, pinocchio_model, predicted_wrench
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.plates import (
+    ClockDrift,
     PlateCrosstalk,
     PlateDrift,
     PlateGain,
     PlateRotation,
     PlateTranslation,
     PlateZero,
+    SyncOffset,
+    joint_change,
 )
 from bsip_cli.effects.scene import Plate, Scene
 from tests.body.standing_person import Swing, standing

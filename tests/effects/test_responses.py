@@ -7,11 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.effects.markers import during, step
 from bsip_cli.effects.scene import without_fast
-from bsip_cli.motion.inverse_kinematics import solve_trial
-from bsip_cli.motion.jacobian import marker_residuals, marker_trust, pose_responses
+from bsip_cli.motion.inverse_kinematics import (
+    marker_residuals,
+    marker_trust,
+    pose_responses,
+    solve_trial,
+)
 from tests.body.standing_person import away, markers_of, standing
 from tests.effects.moving_scene import derivatives, moving, rms, scene_of
 

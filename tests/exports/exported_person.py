@@ -11,7 +11,7 @@ import pinocchio as pin
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from tests.body.standing_person import random_poses, tilted_person
 
 MADE_OF = ("bsip 0 export: participant sub-01, method OM", "made -- of <nothing> & more")

@@ -22,7 +22,7 @@ from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
 from bsip_cli.commands.export_recording import _why_left, causes_here
 from bsip_cli.diagnosis.findings import Number
-from bsip_cli.instruments.c3d_plates import wired_plates
+from bsip_cli.instruments.c3d_file import wired_plates
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session

@@ -12,11 +12,9 @@ from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.base_parameters import Basis, find_basis
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
-from bsip_cli.identification.equations import NormalEquations, Recording, even_noise
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench, wrench_regressor
 from bsip_cli.identification.prior import Prior, Spread, prior_of
+from bsip_cli.identification.problem import NormalEquations, Problem, Recording, even_noise
 from tests.body.standing_person import Swing, standing
 
 MASS_KG = 72.0

@@ -2,11 +2,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bsip_cli.dynamics.ground_wrench import wrench_regressor
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.dynamics.regressor import wrench_regressor
 from bsip_cli.identification.base import base_parameters, estimate
-from bsip_cli.identification.equations import ResidualSeries, accumulate, even_noise, noise_of
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.problem import (
+    Problem,
+    ResidualSeries,
+    accumulate,
+    even_noise,
+    noise_of,
+)
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import (
     equations_of,

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from bsip_cli.body.inertia import from_phi, from_readable
-from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
+from bsip_cli.dynamics.ground_wrench import predicted_wrench, wrench_regressor
 from bsip_cli.identification.consistent import (
     Weights,
     are_physical,

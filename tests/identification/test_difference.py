@@ -7,7 +7,7 @@ import pytest
 
 from bsip_cli.body.person import load_parameters
 from bsip_cli.identification.difference import change_of_segments, difference
-from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.problem import Estimate, Problem
 from tests.identification.synthetic_identification import problem_of, regressor, world
 
 NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.ground_wrench import predicted_wrench
 from bsip_cli.identification.hansen2017 import estimate
 from bsip_cli.identification.uncertainty import excitation, readable
 from tests.identification.synthetic_identification import (

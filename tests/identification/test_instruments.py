@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.ground_wrench import predicted_wrench
 from bsip_cli.identification.consistent import estimate, fit_with_weights, terms_of
-from bsip_cli.identification.equations import INSTRUMENT_COUNT, Instruments, accumulate, even_noise
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.problem import (
+    INSTRUMENT_COUNT,
+    Instruments,
+    Problem,
+    accumulate,
+    even_noise,
+)
 from tests.identification.synthetic_identification import RATE_HZ, recording, regressor, world
 
 ASIDE_M, LATE_S = 0.03, 0.02

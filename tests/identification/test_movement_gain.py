@@ -7,9 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.dynamics.regressor import wrench_regressor
-from bsip_cli.identification.equations import even_noise
-from bsip_cli.identification.estimator import Problem
+from bsip_cli.dynamics.ground_wrench import wrench_regressor
 from bsip_cli.identification.movement_gain import (
     DURATION_S,
     RATE_HZ,
@@ -18,6 +16,7 @@ from bsip_cli.identification.movement_gain import (
     motion_of,
     possible,
 )
+from bsip_cli.identification.problem import Problem, even_noise
 from bsip_cli.identification.uncertainty import beforehand, excitation
 from tests.identification.synthetic_identification import equations_of, regressor, world
 

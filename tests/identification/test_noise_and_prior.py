@@ -5,9 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian
-from bsip_cli.identification.equations import ResidualSeries, noise_of
-from bsip_cli.identification.estimator import Estimate
 from bsip_cli.identification.prior import prior_of
+from bsip_cli.identification.problem import Estimate, ResidualSeries, noise_of
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import SPREAD, world
 

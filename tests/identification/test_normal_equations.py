@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bsip_cli.dynamics.ground_wrench import wrench_regressor
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.dynamics.regressor import wrench_regressor
-from bsip_cli.identification.equations import Recording, accumulate, residual_series
+from bsip_cli.identification.problem import Recording, accumulate, residual_series
 from tests.identification.synthetic_identification import RATE_HZ, motion, recording, world
 
 CUTOFF_HZ = 8.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from bsip_cli.identification.estimator import Estimate
+from bsip_cli.identification.problem import Estimate
 from bsip_cli.identification.uncertainty import RARE, rarity_of
 from bsip_cli.segments import SEGMENTS
 from tests.identification.synthetic_identification import world

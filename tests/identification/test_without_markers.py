@@ -12,8 +12,8 @@ import pytest
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.base_parameters import find_basis
 from bsip_cli.identification.base import base_parameters
-from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.prior import prior_of
+from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import excitation, readable
 from tests.body.standing_person import standing
 from tests.identification.synthetic_identification import SPREAD, problem_of, regressor, world

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.marker_evidence import marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit

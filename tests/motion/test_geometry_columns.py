@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.motion.jacobian import model_markers, subtrees
+from bsip_cli.motion.inverse_kinematics import model_markers, subtrees, tree_of
 from bsip_cli.motion.scaling import ScalingOptions, _column, _parameters, _with
 from tests.body.standing_person import markers_of, random_poses, tilted_person
 

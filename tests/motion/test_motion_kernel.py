@@ -4,13 +4,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.motion.inverse_kinematics import neutral, tree_of
-from bsip_cli.motion.jacobian import (
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.motion.inverse_kinematics import (
     coordinate_covariance,
     model_markers,
+    neutral,
     pose_columns,
     subtrees,
+    tree_of,
 )
 from tests.body.standing_person import (
     away,

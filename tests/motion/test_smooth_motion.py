@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.smoothing import _angular, smooth_motion
 from bsip_cli.motion.splines import SmoothSignal

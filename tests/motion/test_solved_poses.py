@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import least_squares
 
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.inverse_kinematics import (
     first_pose,

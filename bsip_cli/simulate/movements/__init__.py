@@ -9,8 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bsip_cli.simulate.movements.gait import running, walking
-from bsip_cli.simulate.movements.jumps import basketball, hops
+from bsip_cli.simulate.movements.moving import basketball, hops, running, walking
 from bsip_cli.simulate.movements.standing import (
     postures,
     sequence,

@@ -1,4 +1,4 @@
-"""The identification's normal equations, accumulated in blocks over trials, and their noise."""
+"""The problem that every estimator solves: normal equations, their noise, and what comes back."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import pinocchio as pin
 from scipy import sparse
 from scipy.optimize import nnls
 
+from bsip_cli.dynamics.base_parameters import Basis
+from bsip_cli.dynamics.ground_wrench import bodies_of, move_moments, wrench_regressor
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
-from bsip_cli.dynamics.pinocchio_model import bodies_of
-from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+from bsip_cli.identification.prior import Prior
 from bsip_cli.statistics.samples import effective_samples
 
 # --- what the instruments may do wrong, jointly with the body -------------------------------------
@@ -285,3 +286,62 @@ def _size_over_time(residual: np.ndarray, level: np.ndarray) -> tuple[float, flo
 
 def _variances(steady: np.ndarray, with_level: np.ndarray, level: np.ndarray) -> np.ndarray:
     return steady**2 + with_level**2 * level[:, None] ** 2
+
+
+# --- the interface of the estimators and what they return -----------------------------------------
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything an estimator may use.
+
+    The next three are options of [identify]: how many times worse the data are than they look; the
+    sigma% below which a base parameter counts; and how many deviations as large as [prior] says
+    count with this person's own. ``whole``: the equations before the wrench of segments that keep
+    the table's values was taken off; None where no segment does. ``jointly``: the equations with
+    the instruments' columns after the parameters.
+    """
+
+    equations: NormalEquations
+    noise: Noise
+    prior: Prior
+    basis: Basis
+    trust_ratio: float
+    sigma_percent_limit: float = 5.0
+    spread_weight: float = 4.0
+    whole: NormalEquations | None = None
+    jointly: NormalEquations | None = None
+
+    def every_equation(self) -> NormalEquations:
+        """Those of all segments' parameters."""
+        return self.equations if self.whole is None else self.whole
+
+    def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
+        return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
+
+    def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
+        equations = self.jointly or self.equations
+        return equations.weighted(self.noise.weights() / self.trust_ratio**2)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters (P,) about the joint centres, their covariance (P, P), and a note for people.
+
+    ``prior_covariance`` (P, P) where the estimator weighs the prior itself: what the data share is
+    counted from.
+    """
+
+    phi: np.ndarray
+    covariance: np.ndarray
+    note: str
+    prior_covariance: np.ndarray | None = None
+
+    def residual_rms(self, problem: Problem) -> np.ndarray:
+        """(6,) residual [N, N m] that the estimate leaves in its own data."""
+        return problem.every_equation().residual_rms(self.phi)
+
+
+Estimator = Callable[[Problem], Estimate]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-
-# Effects that nothing in these recordings tells from each other (design, section 6).
-_VERTICAL = ("plate_gain", "plate_zero", "added_mass")
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,8 @@ class Cause:
         vertical force in the file's axes) are filled in for each recording.
     place : the target as the diagnosis prints it.
     everywhere : in all moving trials, else in one. over_trial : the size is that at its end.
-    alike : effects that may share its class, or stand for it where nothing tells them apart.
+    alike : effects that may share its class, or stand for it where nothing in these recordings
+        tells them apart (design, section 6).
     """
 
     words: str
@@ -53,97 +53,16 @@ class Cause:
     alike: tuple[str, ...] = ()
 
 
-CAUSES = (
-    Cause("delay 10 ms", "sync_offset", 0.010, "-", "", Parameter(("delay",), "ms", 1e3)),
-    Cause(
-        "plate 1 shifted by 20 mm",
-        "plate_translation",
-        0.020,
-        "x,plate=1",
-        "1",
-        Parameter(("x",), "mm", 1e3),
-    ),
-    Cause(
-        "plate 1 turned by 3 degrees",
-        "plate_rotation",
-        0.05236,
-        "yaw,plate=1",
-        "1",
-        Parameter(("yaw",), "degrees", 57.2958),
-    ),
-    Cause(
-        "vertical gain 4 %",
-        "plate_gain",
-        0.04,
-        "{up},plate=1",
-        "1 fz",
-        Parameter(("gain",), "%", 100.0),
-        everywhere=False,
-        alike=_VERTICAL,
-    ),
-    Cause(
-        "crosstalk fz to fx 2 %",
-        "plate_crosstalk",
-        0.02,
-        "{up}:fx,plate=1",
-        "1 fz>fx",
-        Parameter(("coefficient",), "%", 100.0),
-        alike=("plate_rotation", "plate_zero"),
-    ),
-    Cause(
-        "vertical zero 15 N",
-        "plate_zero",
-        15.0,
-        "{up},plate=1",
-        "1 fz",
-        Parameter(("offset",), "N"),
-        everywhere=False,
-        alike=_VERTICAL,
-    ),
-    Cause(
-        "vertical drift 15 N",
-        "plate_drift",
-        15.0,
-        "{up},plate=1",
-        "1 fz",
-        Parameter(("drift",), "N/s"),
-        everywhere=False,
-        over_trial=True,
-    ),
-    Cause(
-        "marker off by 30 mm",
-        "marker_shift",
-        0.030,
-        "{marker}",
-        "{marker}",
-        Parameter(("shift_x", "shift_y", "shift_z"), "mm", 1e3),
-        everywhere=False,
-    ),
-    Cause(
-        "labels exchanged for 2 s",
-        "marker_swap",
-        2.0,
-        "{pair}",
-        "{pair}",
-        Parameter(("start", "end"), "s", spans=True),
-        everywhere=False,
-    ),
-    Cause(
-        "markers smoothed at 3 Hz",
-        "over_smoothing",
-        3.0,
-        "-",
-        "",
-        Parameter(("cutoff",), "Hz"),
-    ),
-    Cause(
-        "1 kg on a segment",
-        "added_mass",
-        1.0,
-        "{segment}",
-        "{segment}",
-        Parameter(("mass",), "kg"),
-        everywhere=False,
-        alike=("plate_gain", "plate_zero"),
-    ),
-)
+def _cause(row: Mapping[str, str]) -> Cause:
+    names, factor = tuple(row["names"].split()), float(row["factor"])
+    return Cause(
+        *(row["words"], row["effect"], float(row["size"]), row["target"], row["place"]),
+        Parameter(names, row["unit"], factor, bool(row["spans"])),
+        everywhere=bool(row["everywhere"]),
+        over_trial=bool(row["over_trial"]),
+        alike=tuple(row["alike"].split()),
+    )
+
+
+with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as _file:
+    CAUSES = tuple(map(_cause, csv.DictReader(_file)))

@@ -17,24 +17,8 @@ OPENPOSE = (
     "Nose Neck RShoulder RElbow RWrist LShoulder LElbow LWrist MidHip RHip RKnee RAnkle LHip LKnee "
     "LAnkle REye LEye REar LEar LBigToe LSmallToe LHeel RBigToe RSmallToe RHeel"
 )
-MEDIAPIPE = " ".join(
-    f"{side}_{name}"
-    for side in ("LEFT", "RIGHT")
-    for name in [
-        "EYE",
-        "EAR",
-        "SHOULDER",
-        "ELBOW",
-        "WRIST",
-        "HIP",
-        "KNEE",
-        "ANKLE",
-        "HEEL",
-        "FOOT_INDEX",
-        "PINKY",
-        "THUMB",
-    ]
-)
+_MEDIAPIPE = "EYE EAR SHOULDER ELBOW WRIST HIP KNEE ANKLE HEEL FOOT_INDEX PINKY THUMB"
+MEDIAPIPE = " ".join(f"{side}_{name}" for side in ("LEFT", "RIGHT") for name in _MEDIAPIPE.split())
 THEIA = " ".join(
     f"{s}{n}" for s in "LR" for n in ["HJC", "KJC", "AJC", "SJC", "EJC", "WJC", "Heel", "Toe"]
 )
@@ -43,57 +27,14 @@ DEEPLABCUT = " ".join(
     for name in ["eye", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "heel", "toe"]
     for side in ("left", "right")
 )
-OPENCAP = (
-    OPENPOSE.replace("MidHip", "midHip")
-    + " "
-    + " ".join(
-        f"{name}_study"
-        for name in [
-            "r.ASIS",
-            "L.ASIS",
-            "r.PSIS",
-            "L.PSIS",
-            "r_knee",
-            "L_knee",
-            "r_mknee",
-            "L_mknee",
-            "r_ankle",
-            "L_ankle",
-            "r_mankle",
-            "L_mankle",
-            "r_calc",
-            "L_calc",
-            "r_toe",
-            "L_toe",
-            "r_5meta",
-            "L_5meta",
-            "r_shoulder",
-            "L_shoulder",
-            "C7",
-            "RHJC",
-            "LHJC",
-            "r_thigh1",
-            "r_thigh2",
-            "r_thigh3",
-            "L_thigh1",
-            "L_thigh2",
-            "L_thigh3",
-            "r_sh1",
-            "r_sh2",
-            "r_sh3",
-            "L_sh1",
-            "L_sh2",
-            "L_sh3",
-            "r_lelbow",
-            "r_melbow",
-            "r_lwrist",
-            "r_mwrist",
-            "L_lelbow",
-            "L_melbow",
-            "L_lwrist",
-            "L_mwrist",
-        ]
-    )
+_STUDY = """
+r.ASIS L.ASIS r.PSIS L.PSIS r_knee L_knee r_mknee L_mknee r_ankle L_ankle r_mankle L_mankle
+r_calc L_calc r_toe L_toe r_5meta L_5meta r_shoulder L_shoulder C7 RHJC LHJC r_thigh1 r_thigh2
+r_thigh3 L_thigh1 L_thigh2 L_thigh3 r_sh1 r_sh2 r_sh3 L_sh1 L_sh2 L_sh3 r_lelbow r_melbow
+r_lwrist r_mwrist L_lelbow L_melbow L_lwrist L_mwrist
+"""
+OPENCAP = " ".join(
+    [OPENPOSE.replace("MidHip", "midHip"), *(f"{name}_study" for name in _STUDY.split())]
 )
 
 

@@ -31,47 +31,18 @@ from tests.simulate.conftest import NOTHING_RICH, is_physical, person_of
 G = 9.81
 PERSON_SEED = 3
 DURATION_S = {"static": 3.0, "squat": 4.0, "hops": 4.0, "stepon": 9.0}
-VOCABULARY = """
-sync_offset clock_drift plate_translation plate_rotation plate_gain plate_crosstalk plate_zero
-plate_drift gravity_tilt added_mass released_object wobbling_mass breathing unmeasured_contact
-joint_centre missing_joint marker_shift marker_swap over_smoothing segment_inertia
-implement camera_frame external_force object_handled marker_slide
-"""
-SIZES = {
-    "sync_offset": 0.02,
-    "clock_drift": 0.002,
-    "plate_translation": 0.01,
-    "plate_rotation": 0.03,
-    "plate_gain": 0.03,
-    "plate_crosstalk": 0.02,
-    "plate_zero": 10.0,
-    "plate_drift": 1.0,
-    "gravity_tilt": 0.02,
-    "added_mass": 3.0,
-    "released_object": 2.0,
-    "wobbling_mass": 3.0,
-    "breathing": 0.05,
-    "unmeasured_contact": 60.0,
-    "joint_centre": 0.03,
-    "missing_joint": 0.3,
-    "marker_shift": 0.03,
-    "marker_swap": 1.0,
-    "over_smoothing": 2.0,
-    "segment_inertia": 0.4,
-    "implement": 0.5,
-    "camera_frame": 0.02,
-    "external_force": 60.0,
-    "object_handled": 2.0,
-    "marker_slide": 0.03,
-    "outside_belt_vibration": 20.0,
-    "outside_plate_hysteresis": 8.0,
-    "outside_plate_saturation": 0.05,
-    "outside_repeated_frames": 0.2,
-    "outside_elastic_tether": 120.0,
-    "outside_late_channel": 0.02,
-    "outside_loose_connector": 0.03,
-    "outside_clock_jump": 0.05,
-}
+SIZES_OF_EFFECTS = """
+sync_offset 0.02, clock_drift 0.002, plate_translation 0.01, plate_rotation 0.03, plate_gain 0.03,
+plate_crosstalk 0.02, plate_zero 10.0, plate_drift 1.0, gravity_tilt 0.02, added_mass 3.0,
+released_object 2.0, wobbling_mass 3.0, breathing 0.05, unmeasured_contact 60.0,
+joint_centre 0.03, missing_joint 0.3, marker_shift 0.03, marker_swap 1.0, over_smoothing 2.0,
+segment_inertia 0.4, implement 0.5, camera_frame 0.02, external_force 60.0, object_handled 2.0,
+marker_slide 0.03,
+outside_belt_vibration 20.0, outside_plate_hysteresis 8.0, outside_plate_saturation 0.05,
+outside_repeated_frames 0.2, outside_elastic_tether 120.0, outside_late_channel 0.02,
+outside_loose_connector 0.03, outside_clock_jump 0.05
+"""  # the contract's vocabulary in its order, and effects outside of it
+SIZES = {n: float(x) for n, x in (pair.split() for pair in SIZES_OF_EFFECTS.split(","))}
 
 
 def effect_of(name: str, size: float | None = None, target: str = "", seed: int = 1):
@@ -121,7 +92,9 @@ def cop_of(measurement: Measurement) -> np.ndarray:
 
 
 def test_the_vocabulary_is_the_contracts():
-    assert [name for name in EFFECTS if name not in OUTSIDE] == VOCABULARY.split()
+    assert [name for name in EFFECTS if name not in OUTSIDE] == [
+        name for name in SIZES if not name.startswith("outside_")
+    ]
     assert len(OUTSIDE) >= 3
     assert all(name.startswith("outside_") for name in OUTSIDE)
     assert set(SIZES) == set(EFFECTS)

@@ -17,62 +17,29 @@ class Landmark:
     place_m: np.ndarray
 
 
-_TRUNK_PLUG_IN = {
-    "C7": "c7",
-    "T10": "t10",
-    "STRN": "xiphoid",
-    "CLAV": "suprasternale",
-    "RBAK": "scapula",
-    "RFHD": "forehead_r",
-    "LFHD": "forehead_l",
-    "RBHD": "occiput_r",
-    "LBHD": "occiput_l",
-}
-_TRUNK_HANSEN = {
-    "C7": "c7",
-    "T10": "t10",
-    "XIPH": "xiphoid",
-    "IJ": "suprasternale",
-    "RSCAP": "scapula",
-    "RTEM": "temple_r",
-    "LTEM": "temple_l",
-    "FHEAD": "forehead",
-}
+def _pairs(text: str) -> dict[str, str]:
+    """Landmarks by label, as in "C7 c7, T10 t10"."""
+    return dict(pair.split() for pair in text.split(","))
+
+
+_TRUNK_PLUG_IN = _pairs(
+    """C7 c7, T10 t10, STRN xiphoid, CLAV suprasternale, RBAK scapula, RFHD forehead_r,
+    LFHD forehead_l, RBHD occiput_r, LBHD occiput_l"""
+)
+_TRUNK_HANSEN = _pairs(
+    """C7 c7, T10 t10, XIPH xiphoid, IJ suprasternale, RSCAP scapula, RTEM temple_r, LTEM temple_l,
+    FHEAD forehead"""
+)
 # Labels without their side, which comes before them.
-_SIDES_PLUG_IN = {
-    "SHO": "acromion",
-    "ASI": "asis",
-    "PSI": "psis",
-    "UPA": "upper_arm",
-    "ELB": "elbow",
-    "FRM": "forearm",
-    "WRA": "radius",
-    "WRB": "ulna",
-    "FIN": "knuckle",
-    "THI": "thigh",
-    "KNE": "knee_lateral",
-    "TIB": "shank",
-    "ANK": "ankle_lateral",
-    "HEE": "heel",
-    "TOE": "toe",
-}
-_SIDES_HANSEN = {
-    "AC": "acromion",
-    "ASIS": "asis",
-    "PSIS": "psis",
-    "UA": "upper_arm",
-    "ELB": "elbow",
-    "FA": "forearm",
-    "WRR": "radius",
-    "WRU": "ulna",
-    "HAND": "knuckle",
-    "KNEL": "knee_lateral",
-    "KNEM": "knee_medial",
-    "MALL": "ankle_lateral",
-    "MALM": "ankle_medial",
-    "CAL": "heel",
-    "MT2": "toe",
-}
+_SIDES_PLUG_IN = _pairs(
+    """SHO acromion, ASI asis, PSI psis, UPA upper_arm, ELB elbow, FRM forearm, WRA radius,
+    WRB ulna, FIN knuckle, THI thigh, KNE knee_lateral, TIB shank, ANK ankle_lateral, HEE heel, TOE toe"""
+)
+_SIDES_HANSEN = _pairs(
+    """AC acromion, ASIS asis, PSIS psis, UA upper_arm, ELB elbow, FA forearm, WRR radius, WRU ulna,
+    HAND knuckle, KNEL knee_lateral, KNEM knee_medial, MALL ankle_lateral, MALM ankle_medial,
+    CAL heel, MT2 toe"""
+)
 _SIDES_MEDIAL = {**_SIDES_PLUG_IN, "KNM": "knee_medial", "ANM": "ankle_medial"}
 
 

@@ -60,16 +60,11 @@ def moves(gain, joints: tuple[str, ...]) -> bool:
     return any(swing.joint.startswith(joints) for swing in gain.movement.swings)
 
 
-def test_who_moved_the_arms_is_asked_for_legs():
-    found = advise(problem_after(ARMS))
-    assert not any(moves(gain, UPPER) for gain in (*found.together, *found.alone[:6]))
-    assert all(moves(gain, LOWER) for gain in found.together[:2])
-
-
-def test_who_moved_the_legs_is_asked_for_arms():
-    found = advise(problem_after(LEGS))
-    assert not any(moves(gain, LOWER) for gain in (*found.together, *found.alone[:6]))
-    assert all(moves(gain, UPPER) for gain in found.together[:2])
+@pytest.mark.parametrize(("moved", "own", "other"), [(ARMS, UPPER, LOWER), (LEGS, LOWER, UPPER)])
+def test_who_moved_arms_or_legs_is_asked_for_the_others(moved, own, other):
+    found = advise(problem_after(moved))
+    assert not any(moves(gain, own) for gain in (*found.together, *found.alone[:6]))
+    assert all(moves(gain, other) for gain in found.together[:2])
 
 
 def test_what_was_done_on_one_side_is_asked_for_on_the_other():

@@ -33,7 +33,8 @@ _TRUNK_HANSEN = _pairs(
 # Labels without their side, which comes before them.
 _SIDES_PLUG_IN = _pairs(
     """SHO acromion, ASI asis, PSI psis, UPA upper_arm, ELB elbow, FRM forearm, WRA radius,
-    WRB ulna, FIN knuckle, THI thigh, KNE knee_lateral, TIB shank, ANK ankle_lateral, HEE heel, TOE toe"""
+    WRB ulna, FIN knuckle, THI thigh, KNE knee_lateral, TIB shank, ANK ankle_lateral,
+    HEE heel, TOE toe"""
 )
 _SIDES_HANSEN = _pairs(
     """AC acromion, ASIS asis, PSIS psis, UA upper_arm, ELB elbow, FA forearm, WRR radius, WRU ulna,

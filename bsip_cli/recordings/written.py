@@ -1,5 +1,5 @@
-"""What text files hardly ever say, and may say wrongly: the unit of their forces (a MOT is meant to
-be in N), and the rate of the cameras (in a TRC all times follow from it, and no force does)."""
+"""What text files hardly ever say, or say wrongly: the unit of their forces (a MOT is meant to be in
+N), and the rate of the markers or of the forces, each of which has a file with times of its own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
 FORCE_UNITS_N = {"kN": 1000.0, "kilogram-force": 9.80665, "pounds-force": 4.44822}
 _HALF = 0.5  # of the weight: a person of whom one foot stands off the plates
 _PERCENT = 100.0
-_FEWEST_HZ = 2.0  # steps of the shorter file by which two lengths are the same
+_STEPS = 2.0  # of the coarser clock: lengths that differ by less are the same
 OTHER_RATE = -4.6
 """Logarithm: one session of a hundred states another rate than that of its cameras."""
 
@@ -51,13 +51,13 @@ class Lengths:
 
     def are_alike(self, pace: float) -> bool:
         """If the cameras ran so many times as fast as stated."""
-        return abs(self.markers_s / pace - self.forces_s) <= _FEWEST_HZ * self.step_s
+        return abs(self.markers_s / pace - self.forces_s) <= _STEPS * self.step_s
 
     def log_likelihood(self, pace: float) -> float:
         """Of lengths so alike or different, if that is the pace, logarithm."""
         if self.are_alike(pace):
             return float(np.log(_ALIKE))
-        by_chance = 2.0 * _FEWEST_HZ * self.step_s / max(self.markers_s, self.forces_s)
+        by_chance = 2.0 * _STEPS * self.step_s / max(self.markers_s, self.forces_s)
         return float(np.log(_OF_CHANCE) + np.log(min(by_chance, 1.0)))
 
 
@@ -66,7 +66,7 @@ def likely_paces(trials: Sequence[Lengths | None]) -> dict[float, float]:
     their logarithm of odds against that; a length counts once, as both files may be cut to it."""
     different: list[Lengths] = []
     for one in filter(None, trials):
-        if all(abs(one.markers_s - two.markers_s) > _FEWEST_HZ * one.step_s for two in different):
+        if all(abs(one.markers_s - two.markers_s) > _STEPS * one.step_s for two in different):
             different.append(one)
     prior = OTHER_RATE - np.log(len(PACES) - 1)
     odds = {

@@ -20,8 +20,8 @@ from benchmarks.measure import markdown
 from bsip_cli.config import load_config
 from bsip_cli.errors import NumericalError
 from bsip_cli.pipeline import STAGES
-from bsip_cli.recordings.momentum_mass import Stretch
-from bsip_cli.recordings.told_mass import ToldMass, told_mass
+from bsip_cli.recordings.measured_mass import MeasuredMass, measured_mass
+from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.running.unit import Unit
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Target, body_of
@@ -148,7 +148,7 @@ KINDS: dict[str, Callable[[Person, np.random.Generator], Case]] = {
 class Answer:
     kind: str
     truth_kg: float
-    told: ToldMass
+    told: MeasuredMass
 
     @property
     def error_percent(self) -> float:
@@ -172,7 +172,7 @@ def drawn(kind: str, rng: np.random.Generator, sex: str) -> tuple[Person, Case]:
     raise refused
 
 
-def stretches_of_case(kind: str, seed: int, folder: Path) -> tuple[float, list[Stretch]]:
+def stretches_of_case(kind: str, seed: int, folder: Path) -> tuple[float, list[Interval]]:
     """Simulate one recording, ingest it without a stated mass: true mass and stretches."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
     person, case = drawn(kind, rng, "MF"[seed % 2])
@@ -195,14 +195,14 @@ def stretches_of_case(kind: str, seed: int, folder: Path) -> tuple[float, list[S
     unit = Unit(trial, found, folder / "out", config, participant, participant.trials[0])
     ingest.run(unit)
     records = unit.facts("wrench")["mass_stretches"]
-    return person.mass_kg, [Stretch.of(record) for record in records]
+    return person.mass_kg, [Interval.of(record) for record in records]
 
 
 def answer(kind: str, seed: int) -> Answer:
     with tempfile.TemporaryDirectory() as folder:
         truth, stretches = stretches_of_case(kind, seed, Path(folder))
     most = load_config([]).ingest.mass_half_width_percent
-    return Answer(kind, truth, told_mass({STEM: stretches}, most))
+    return Answer(kind, truth, measured_mass({STEM: stretches}, most))
 
 
 HEADER = (

@@ -28,10 +28,10 @@ _TOUCHED = 20.0  # N or N m: what counts on a plate that bears nobody
 _AROUND = 12  # samples on either side
 _ABSURD_N = 15_000.0  # triple jumpers land with 15 times their weight (Perttunen 2000): 12 kN
 _MANY = 0.02  # of the samples
-_FALSE_POSITIVE = 1e-3  # plates with a sound stretch that is called stuck or repeated
+_FALSE_POSITIVE = 1e-3  # plates with a sound interval that is called stuck or repeated
 _ROUNDING = 4 / 3  # steps beside the cubic by rounding alone: (1 + (4 + 4 + 1 + 1) / 6) / 2
 _BLOCK = 8  # samples: a shorter block holds too little noise to be known again
-_NAMED = 5  # stretches in a sentence
+_NAMED = 5  # intervals in a sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,18 +93,18 @@ def check_samples(
 def _lost(
     absent: np.ndarray, is_natural: bool, load: np.ndarray, spikes: np.ndarray, rate_hz: float
 ) -> np.ndarray:
-    """Stretches in which all channels are zero (``absent``) amid load, (n,) bool.
+    """Intervals in which all channels are zero (``absent``) amid load, (n,) bool.
 
     It comes or goes with a jump that no foot makes in one sample and twice as high as any step
-    elsewhere, or both with such steps; or loaded samples lie on both sides of a short stretch: a
+    elsewhere, or both with such steps; or loaded samples lie on both sides of a short interval: a
     longer one may be flight on a plate whose small forces were set to zero. One sample on each
     side, which may be half lost, belongs to them.
     """
     lost, size = np.zeros(len(load), bool), np.abs(np.nan_to_num(load))
     heavy, near = size > _ABRUPT_N, min(2, int(_RISE_S * rate_hz)) if is_natural else 2
-    stretches, foot = runs(absent), size.max(initial=0.0) / (_RISE_S * rate_hz)
-    leaps = _leaps(np.abs(load), stretches, spikes, _ABRUPT_N, foot)
-    for (start, stop), leap in zip(stretches, leaps, strict=True):
+    intervals, foot = runs(absent), size.max(initial=0.0) / (_RISE_S * rate_hz)
+    leaps = _leaps(np.abs(load), intervals, spikes, _ABRUPT_N, foot)
+    for (start, stop), leap in zip(intervals, leaps, strict=True):
         amid = heavy[max(start - near, 0) : start].any() and heavy[stop : stop + near].any()
         if leap or (amid and stop - start <= _LOST_S * rate_hz):
             lost[max(start - 1, 0) : stop + 1] = True
@@ -112,13 +112,13 @@ def _lost(
 
 
 def _leaps(
-    signal: np.ndarray, stretches: np.ndarray, spikes: np.ndarray, least: float, foot: float = 0.0
+    signal: np.ndarray, intervals: np.ndarray, spikes: np.ndarray, least: float, foot: float = 0.0
 ) -> np.ndarray:
-    """Whether a signal (n,) steps into and out of stretches (m, 2) by more than ``least`` and
+    """Whether a signal (n,) steps into and out of intervals (m, 2) by more than ``least`` and
     twice its largest step elsewhere, or into or out of them by more than ``foot`` too, (m,)."""
     steps = np.pad(np.abs(np.nan_to_num(np.diff(signal))), 1)
-    jumps = steps[stretches]
-    steps[stretches] = 0.0
+    jumps = steps[intervals]
+    steps[intervals] = 0.0
     steps[:-1][spikes] = steps[1:][spikes] = 0.0
     jumps[jumps <= max(least, 2.0 * steps.max())] = 0.0
     return np.asarray((jumps > foot).any(axis=1) | jumps.all(axis=1))
@@ -181,16 +181,16 @@ def _beside_cubic(signal: np.ndarray) -> np.ndarray:
 
 
 def runs(mask: np.ndarray) -> np.ndarray:
-    """Start and stop (exclusive) of each stretch of True, (n_runs, 2)."""
+    """Start and stop (exclusive) of each interval of True, (n_runs, 2)."""
     edges = np.diff(np.concatenate([[0], np.asarray(mask, np.int8), [0]]))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
 
 
 def long_runs(mask: np.ndarray, least: int) -> np.ndarray:
-    """The mask with stretches of True shorter than ``least`` samples taken out, (n,) bool."""
+    """The mask with intervals of True shorter than ``least`` samples taken out, (n,) bool."""
     kept = np.zeros(len(mask), bool)
-    stretches = runs(mask)
-    for start, stop in stretches[np.diff(stretches, axis=1)[:, 0] >= least]:
+    intervals = runs(mask)
+    for start, stop in intervals[np.diff(intervals, axis=1)[:, 0] >= least]:
         kept[start:stop] = True
     return kept
 
@@ -206,7 +206,7 @@ def _cut_off(signal: np.ndarray, rate_hz: float) -> np.ndarray:
 
     A smooth course stays at the level of its peak 2.4 times as long as at the next level (both go
     by square roots); at a limit it stays far longer. Where there are few levels, as of a coarse
-    converter in quiet stance, nothing can be told.
+    converter in quiet stance, nothing can be said.
     """
     flat = np.zeros(len(signal), bool)
     levels, counts = np.unique(signal[np.isfinite(signal)], return_counts=True)
@@ -269,12 +269,12 @@ def _stuck(
     rate_hz: float,
     n_channels: int,
 ) -> np.ndarray:
-    """Stretches of one value of a channel (n,) that its ``noise`` would have changed, (n,) bool.
+    """Intervals of one value of a channel (n,) that its ``noise`` would have changed, (n,) bool.
 
-    If one of two stretches of a length holds T events of noise, the other holds none with
-    probability 2^-T; T is that of the calmest other stretch as long (or half of all there is),
-    loaded or unloaded as this one. All such stretches must be less than the rest.
-    Without noise, a stretch amid load is stuck if the channel leaps into it or out of it, and a
+    If one of two intervals of a length holds T events of noise, the other holds none with
+    probability 2^-T; T is that of the calmest other interval as long (or half of all there is),
+    loaded or unloaded as this one. All such intervals must be less than the rest.
+    Without noise, a interval amid load is stuck if the channel leaps into it or out of it, and a
     long one while the load changes. Where the plate is set to zero (``gone``), nothing is.
     """
     stuck, n = np.zeros(channel.shape, bool), len(channel)
@@ -351,7 +351,7 @@ def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Fi
 
 
 def _times(mask: np.ndarray, rate_hz: float) -> str:
-    """When, from the first sample; the first stretches."""
-    stretches = runs(mask)
-    first = ", ".join(f"{a / rate_hz:.3f} to {b / rate_hz:.3f} s" for a, b in stretches[:_NAMED])
-    return first + (f" and {len(stretches) - _NAMED} more" if len(stretches) > _NAMED else "")
+    """When, from the first sample; the first intervals."""
+    intervals = runs(mask)
+    first = ", ".join(f"{a / rate_hz:.3f} to {b / rate_hz:.3f} s" for a, b in intervals[:_NAMED])
+    return first + (f" and {len(intervals) - _NAMED} more" if len(intervals) > _NAMED else "")

@@ -1,7 +1,7 @@
 """Do these forces carry and drive this body? Newton and Euler for the whole of it.
 
 The sum of all plates' wrenches is the rate of the body's momentum, linear and angular, which the
-markers tell. Horizontal forces go with the acceleration of the centre of mass, moments about it
+markers show. Horizontal forces go with the acceleration of the centre of mass, moments about it
 with the rate of the angular momentum. In complete intervals of 50 sound public recordings the
 forces correlate by 0.5 to 0.99 in movement (median 0.9), moments about level axes by 0.4 to 0.97,
 about the vertical by 0 to 0.9, and none clearly below zero over a second or more. Where they
@@ -63,7 +63,7 @@ USUAL = GateLimits()
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The momentum that the segments' markers tell, at n samples; NaN: not known.
+    """The momentum that the segments' markers show, at n samples; NaN: not known.
 
     place_m : of the centre of mass, (n, 3). rate : of the momentum over the mass, linear [m/s2] and
     angular about the centre of mass [m2/s2], (n, 6). noise : its variance over that of a marker's

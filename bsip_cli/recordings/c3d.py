@@ -100,7 +100,7 @@ def _read_points(
     stated = "".join(texts(group, "UNITS")[:1])
     shown = positions if kept else np.where(is_valid[..., None], every, np.nan)
     names = [labels[i] for i in kept]
-    unit_m, about_unit = scene.settle_unit(shown, names or labels, stated, "POINT:UNITS")
+    unit_m, about_unit = scene.decided_unit(shown, names or labels, stated, "POINT:UNITS")
     positions *= unit_m
     findings += [*scene.without_absurd(positions), *about_unit]
     if is_ignored:
@@ -121,7 +121,7 @@ def _about_invalid(positions_m: np.ndarray, rate_hz: float, path: Path) -> Findi
 
 
 def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
-    """POINT:LABELS with its continuations; duplicates by POINT:DESCRIPTIONS if these tell."""
+    """POINT:LABELS with its continuations; duplicates by POINT:DESCRIPTIONS if these name them."""
     labels, descriptions = (
         (texts(group, name) + [""] * n_points)[:n_points] for name in ("LABELS", "DESCRIPTIONS")
     )
@@ -131,7 +131,7 @@ def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
     resolved = len({renamed[i] for i in twice}) == len(twice) and all(
         renamed[i] and renamed[i] not in counts.keys() - {labels[i]} for i in twice
     )
-    if not twice or not resolved:  # what nobody asks for need not be told apart
+    if not twice or not resolved:  # what nobody asks for need not be distinguished
         return labels, []
     shared = sorted({labels[i] for i in twice})
     found = f"{len(twice)} points share {len(shared)} labels"

@@ -38,9 +38,9 @@ from bsip_cli.recordings.c3d_layout import (
     about_scales,
     says_unsigned,
     scaling_of,
-    settle_layout,
-    settle_rate,
-    settle_scale,
+    decided_layout,
+    decided_rate,
+    decided_scale,
 )
 from bsip_cli.recordings.c3d_mend import mended, needs_mending, pieces
 from bsip_cli.recordings.model import Finding, refusal
@@ -90,9 +90,9 @@ def read_content(path: Path) -> Content:
     reach = (header.data_start_block - 1) * BLOCK if header.data_start_block > 2 else None
     records = read_records(path, raw[:reach])
     stated = parameters_of(records, header.processor)
-    layout, findings = settle_layout(path, header, stated, len(raw))
-    rate_hz, about_rate = settle_rate(path, header, stated, layout)
-    point_scale, about_scale = settle_scale(header, stated)
+    layout, findings = decided_layout(path, header, stated, len(raw))
+    rate_hz, about_rate = decided_rate(path, header, stated, layout)
+    point_scale, about_scale = decided_scale(header, stated)
     about_scale += about_scales(stated.get("ANALOG", {}), layout.n_channels)
     scaling = scaling_of(stated.get("ANALOG", {}), layout.n_channels, says_unsigned(records))
     if needs_mending(header, records, layout, rate_hz):

@@ -72,7 +72,7 @@ class Layout:
         )
 
 
-def settle_layout(
+def decided_layout(
     path: Path, header: Header, parameters: Parameters, file_size: int
 ) -> tuple[Layout, list[Finding]]:
     """The layout of the data, and a finding where header and parameters disagree.
@@ -137,7 +137,7 @@ def _by_header(header: Header, parameters: Parameters, file_size: int) -> Layout
 
 
 def _many_frames(parameters: Parameters) -> int:
-    """The count of frames that does not fit the header, 0 if nothing tells it.
+    """The count of frames that does not fit the header, 0 if nothing shows it.
 
     TRIAL's fields of two words each, the low word first, or a float.
     """
@@ -181,7 +181,7 @@ def _count(group: Group, name: str) -> int | None:
 # --- rates and scales -----------------------------------------------------------------------------
 
 
-def settle_rate(
+def decided_rate(
     path: Path, header: Header, parameters: Parameters, layout: Layout
 ) -> tuple[float, list[Finding]]:
     """Frames per second, and findings where the file's statements of rates differ."""
@@ -207,7 +207,7 @@ def settle_rate(
     return rate_hz, findings
 
 
-def settle_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
+def decided_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
     """Size of one count of the coordinates, negative where they are floats, as ezc3d wants it."""
     stated = number(parameters.get("POINT", {}), "SCALE")
     if not np.isfinite(stated) or stated == 0:

@@ -108,7 +108,7 @@ def mended(
     section = _section(_replaced(own, layout, rate_hz, scale, start))
     data = content[layout.start : layout.start + layout.n_bytes]
     data = _as_pc(data, FLOAT if layout.is_float else INTEGER, header.processor)
-    # The first block with the settled counts, without events.
+    # The first block with the decided counts, without events.
     per_frame = layout.n_channels * layout.samples_per_frame
     head = struct.pack("<2B4H", 2, C3D_KEY, layout.n_points, per_frame, 1, layout.n_frames)
     head += struct.pack("<HfHHf", 0, scale, start, layout.samples_per_frame, rate_hz)
@@ -131,7 +131,7 @@ def _replaced(
     n = layout.n_channels
     counts = [min(_MOST, n - k) for k in range(0, n, _MOST)]
     parts = [(f"{k + 1}" if k else "", count) for k, count in enumerate(counts)]
-    settled = [
+    decided = [
         _words(point, "USED", [layout.n_points]),
         _words(point, "FRAMES", [layout.n_frames]),
         _words(point, "DATA_START", [start]),
@@ -147,9 +147,9 @@ def _replaced(
         Record(-number, name, b"", True)
         for number, name in ({point: "POINT", analog: "ANALOG"} | dict(names)).items()
     ]
-    known = {(record.group, record.name) for record in settled}
+    known = {(record.group, record.name) for record in decided}
     others = [r for r in records if r.group in names and (r.group, r.name) not in known]
-    return [*groups, *settled, *others]
+    return [*groups, *decided, *others]
 
 
 def _number_of(names: Mapping[int, str], wanted: str, place: int) -> int:

@@ -142,7 +142,7 @@ def _pair(
         mass, height = masses[0].value, heights[0].value
         if len(masses) == len(heights) == 1 and not is_usual_pair(mass, height):
             may_be = " or ".join(f"{m.value:.1f} kg ({m.unit})" for m, _ in pairs)
-            found = f"a mass of {mass:.4g} kg beside a height of {height:.3g} m"
+            found = f"a mass of {mass:.4g} kg with a height of {height:.3g} m"
             expected = f"a mass of people: {may_be}" if may_be else "a mass of people"
             findings.append(_unused(found, expected))
             masses = ()

@@ -27,7 +27,7 @@ _PLATE_UNITS = ("mm", "cm", "in", "m")
 _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
 _USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
 _SAME_PLACE_M = 1e-3  # as precise as corners are written
-_PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, so that they can be told apart
+_PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, that can be distinguished
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -207,7 +207,7 @@ def _in_si(
 
     A unit that is no mechanical one (V) means N and N x length: volts may be scaled forces, a
     misprint not. Where no unit of moments is stated, nobody measures in N times cm or inches, but
-    in N mm, or, as the feet tell, N m.
+    in N mm, or, as the feet show, N m.
     """
     usual_Nm = length_unit_m if length_unit_m in _USUAL_LENGTHS_M else 1e-3
     matrix = numbers(content.group("FORCE_PLATFORM"), "CAL_MATRIX")

@@ -68,7 +68,7 @@ class Lags:
 
 
 def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
-    """Of a trial, its plates as the file says but for their signs; None where nothing tells."""
+    """Of a trial, its plates as the file says but for their signs; None where nothing shows it."""
     recording = opened.recording
     rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
     step = max(1, round(_STEP_S * rate_hz))

@@ -16,8 +16,8 @@ from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.resample import FrameWrench
 
 NO_MASS = (
-    "whether something else bears the person (seat, box, hands) cannot be told: neither a stated "
-    "mass nor this trial's plates tell what the person weighs"
+    "whether something else bears the person (seat, box, hands) is not known: neither a stated "
+    "mass nor this trial's plates show what the person weighs"
 )
 _SIDES = {"l": "left", "r": "right"}
 _TOUCH_HEIGHT_M = 0.035  # above a marker's own standing height
@@ -194,7 +194,7 @@ def _touches(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
 
-    A foot on a moving belt is not slow: the load under it tells.
+    A foot on a moving belt is not slow: the load under it decides.
     """
     near_load = np.zeros(len(foot.seen), bool)  # a marker is near the load of a plate
     for plate in plates:
@@ -251,10 +251,10 @@ def _finding(subject: str, found: str) -> Finding:
 
 
 def _times(mask: np.ndarray, rate_hz: float, most: int = 6) -> str:
-    """The stretches of True in words."""
-    stretches = runs(mask)
-    words = [f"{a / rate_hz:.2f} to {b / rate_hz:.2f} s" for a, b in stretches[:most]]
-    more = f" and {len(stretches) - most} more" if len(stretches) > most else ""
+    """The intervals of True in words."""
+    intervals = runs(mask)
+    words = [f"{a / rate_hz:.2f} to {b / rate_hz:.2f} s" for a, b in intervals[:most]]
+    more = f" and {len(intervals) - most} more" if len(intervals) > most else ""
     return ", ".join(words) + more
 
 

@@ -19,7 +19,7 @@ _LOOSE_M = 0.01  # a cluster that changes shape by more is not rigid
 _ROUNDING_S = 1e-9
 _SUPPORT = 8  # frames used on each side by the spline
 
-_SPANS_TOLD = 5
+_SPANS_SHOWN = 5
 # Of frames that repeat the one before:
 _NEARLY_ALL = 0.9  # of the markers seen in both frames
 _LEAST_MARKERS = 4
@@ -139,10 +139,10 @@ def without_repeats(recording: Recording) -> tuple[Recording, list[Finding]]:
         own = np.flatnonzero(held.any(axis=0))
         names = [recording.labels[k] for k in own]
         told = [f"{recording.labels[k]} at {_spans(recording, held[:, k])}" for k in own]
-        more = f" and {len(own) - _SPANS_TOLD} more markers" if len(own) > _SPANS_TOLD else ""
+        more = f" and {len(own) - _SPANS_SHOWN} more markers" if len(own) > _SPANS_SHOWN else ""
         found = (
             f"{held.sum()} positions repeat the last one to the last digit while the markers "
-            f"around move: {'; '.join(told[:_SPANS_TOLD])}{more}"
+            f"around move: {'; '.join(told[:_SPANS_SHOWN])}{more}"
         )
         expected = "gaps where a marker was not seen"
         words = (found, expected, action)
@@ -154,9 +154,9 @@ def without_repeats(recording: Recording) -> tuple[Recording, list[Finding]]:
 def _spans(recording: Recording, frames: np.ndarray) -> str:
     """When the frames are, in seconds."""
     spans, times = runs(frames), recording.time_s()
-    ends = [(times[start], times[stop - 1]) for start, stop in spans[:_SPANS_TOLD]]
+    ends = [(times[start], times[stop - 1]) for start, stop in spans[:_SPANS_SHOWN]]
     told = [f"{a:.2f}" if a == b else f"{a:.2f} to {b:.2f}" for a, b in ends]
-    more = f" and {len(spans) - _SPANS_TOLD} more times" if len(spans) > _SPANS_TOLD else ""
+    more = f" and {len(spans) - _SPANS_SHOWN} more times" if len(spans) > _SPANS_SHOWN else ""
     return f"{', '.join(told)} s{more}"
 
 

@@ -96,7 +96,7 @@ class Hypothesis:
 
     def paces(self, percent: float) -> dict[str, float]:
         """How many times as fast as stated trials ran, other than 1, where that is so likely: one
-        for all, where together they tell it, or else each its own."""
+        for all, where together they show it, or else each its own."""
         of_all = pace(list(self.of_paces.values()), percent)
         own = {name: pace([one], percent) for name, one in self.of_paces.items()}
         found = own if of_all == 1.0 else dict.fromkeys(own, of_all)

@@ -122,7 +122,7 @@ def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     real = [label for label in labels if label not in drawn and len(label) <= _LONGEST]
     read = {lang: _read_all(real, lang) for lang in _languages() if lang.may_be(real)}
     best = read[max(read, key=lambda lang: _worth(read[lang]) * lang.part)]
-    return _settled({label: meaning for label, (meaning, _) in best.items()})
+    return _decided({label: meaning for label, (meaning, _) in best.items()})
 
 
 def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Meaning, float]]:
@@ -151,7 +151,7 @@ def _worth(found: Mapping[str, tuple[Meaning, float]]) -> float:
     return sum(1 / cost for _, cost in found.values()) + sum(bony.values())
 
 
-def _settled(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
+def _decided(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
     """One label per landmark; clusters only track."""
     stems = Counter((found[label], _stem(label)) for label in found)
 

@@ -158,7 +158,8 @@ def guess_marker_set(labels: Sequence[str], prefix: str = "", source: str = "FIL
     shown = ", ".join(sorted(labels)[:12]) + (" ..." if len(labels) > 12 else "")
     raise BadDataError(
         f"no known marker set fits ({best.marker_set.name} comes nearest with {best.share:.0%} of "
-        f"its markers); of {best.labels} labels the words tell {len(guess.marker_set.markers)}, "
+        f"its markers); of {best.labels} labels the words identify "
+        f"{len(guess.marker_set.markers)}, "
         f"none on {', '.join(lacking)}; labels are {shown}",
         expected="one of " + ", ".join(shipped_names()) + ", or labels that say these places",
         remedy=f"write a marker set (`bsip markers {source}` makes a first one of this file's "

@@ -62,8 +62,8 @@ class Plate:
 class StatedPerson:
     """What a file says of the person; None or empty where it says nothing.
 
-    ``sex`` is M, F or other; ``name`` is the subject's in the recording program: it serves to tell
-    people apart and is written nowhere.
+    ``sex`` is M, F or other; ``name`` is the subject's in the recording program: it serves to
+    distinguish people and is written nowhere.
     """
 
     mass_kg: float | None = None

@@ -1,7 +1,7 @@
-"""The mass that the plates tell in stretches of a trial: the balance of momentum.
+"""The mass that the plates measure in intervals of a trial: the balance of momentum.
 
-Over a stretch in which every contact is on the plates the impulse of the vertical force is
-m (g T + dv), dv the change of the centre of mass's vertical velocity. The markers tell dv but for
+Over a interval in which every contact is on the plates the impulse of the vertical force is
+m (g T + dv), dv the change of the centre of mass's vertical velocity. The markers show dv but for
 what they leave unseen: segments heavier or lighter than the table says, centres of mass elsewhere
 between the joints than the markers, soft tissue. These errors belong to how a segment moves against
 the rest, so that they cancel where the posture moves alike at both ends: between the apexes of
@@ -34,15 +34,15 @@ STILL_SD_M_S = 0.006  # heart, breath, and noise of markers in quiet stance
 SOFT_SD = 0.15  # soft tissue and the rest, of the spread of the segments' velocities
 IMPACT_SD_S = 0.004  # soft tissue after an impact, times the acceleration [m/s2]
 
-MARGIN_S = 0.5  # of markers about a stretch, for the filter
+MARGIN_S = 0.5  # of markers about a interval, for the filter
 EDGE_S = 0.1  # at either end of a recording the filtered velocity is not to be trusted
 NODE_S = 0.2  # the impulse is compared this often
 LONGEST_S = 2.0
 SHORTEST_S = 0.3
 LEAST_MEAN_N = 50.0
 UPRIGHT_COS = 0.8  # pelvis over the shanks, 37 degrees: less is sitting or a deep squat
-UPRIGHT_SHARE = 0.3  # of a stretch
-COMES_AND_GOES = 4.0  # reduced chi-square of the impulses within a stretch: twice the errors
+UPRIGHT_SHARE = 0.3  # of a interval
+COMES_AND_GOES = 4.0  # reduced chi-square of the impulses within a interval: twice the errors
 DOUBTFUL_SD = 0.5
 
 NEIGHBOUR = {
@@ -63,13 +63,13 @@ _ROWS = {"lower_torso": "pelvis", "upper_torso": "torso", "upper_arm": "arm"}
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """One stretch's mass and its relative errors.
+class Interval:
+    """One interval's mass and its relative errors.
 
-    ``own_sd`` : relative, independent of other stretches.
-    ``common`` : relative errors (one standard deviation each) shared by all stretches of a person:
+    ``own_sd`` : relative, independent of other intervals.
+    ``common`` : relative errors (one standard deviation each) shared by all intervals of a person:
     per kind of segment its share of the mass and the place of its centre.
-    ``of_trial`` : the same for errors that a trial's stretches share: delay, zero.
+    ``of_trial`` : the same for errors that a trial's intervals share: delay, zero.
     ``steadiness`` : reduced chi-square of the impulses within it.
     """
 
@@ -81,7 +81,7 @@ class Stretch:
     of_trial: tuple[float, ...]
     steadiness: float
 
-    def without(self, load_kg: float) -> Stretch:
+    def without(self, load_kg: float) -> Interval:
         """The same less a mass that is known to be carried."""
         own = max(self.mass_kg - load_kg, 1e-3)
         up = self.mass_kg / own
@@ -93,7 +93,7 @@ class Stretch:
         return {**asdict(self), **{name: list(getattr(self, name)) for name in _SHARED}}
 
     @classmethod
-    def of(cls, record: Mapping) -> Stretch:
+    def of(cls, record: Mapping) -> Interval:
         """From an artifact's facts."""
         shared = {name: tuple(record[name]) for name in _SHARED}
         return cls(**{**record, **shared})
@@ -175,15 +175,15 @@ def _shares() -> dict[str, float]:
     }
 
 
-def stretches_of(
+def intervals_of(
     markers_m: Mapping[str, np.ndarray],
     force_z_N: np.ndarray,
     measured: np.ndarray,
     rate_hz: float,
-) -> tuple[Stretch, ...]:
-    """What each stretch with all contacts ``measured`` (n,) bool by plates tells.
+) -> tuple[Interval, ...]:
+    """What each interval with all contacts ``measured`` (n,) bool by plates shows.
 
-    ``markers_m`` (n, k, 3) per segment; ``force_z_N`` (n,) is the sum of all plates. A stretch
+    ``markers_m`` (n, k, 3) per segment; ``force_z_N`` (n,) is the sum of all plates. A interval
     counts where the person is upright for a part of it.
     """
     found, inner = [], measured.copy()
@@ -208,7 +208,7 @@ def stretches_of(
 
 def _stretch(
     force_z_N: np.ndarray, motion: SegmentMotion, first: int, last: int, rate_hz: float
-) -> Stretch | None:
+) -> Interval | None:
     seconds = (last - first) / rate_hz
     count = max(1, round(seconds / NODE_S))
     nodes = np.unique(np.round(np.linspace(first, last, count + 1)).astype(int))
@@ -238,7 +238,7 @@ def _stretch(
     residual = impulse / mass - reach
     free = len(impulse) - 1
     chi = float(residual @ np.linalg.solve(covariance, residual)) / free if free else 1.0
-    return Stretch(
+    return Interval(
         float(first / rate_hz),
         seconds,
         mass,

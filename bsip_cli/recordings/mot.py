@@ -38,7 +38,7 @@ _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
 _AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
-_NAMES_TOLD = 12
+_NAMES_SHOWN = 12
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -263,8 +263,8 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
                 values[idle & ~np.isfinite(values).all(axis=1)] = 0.0
                 _hold_nearest(values, light & ~np.isfinite(values).all(axis=1), ~light)
     unknown = [name for i, name in enumerate(table.names) if i not in used]
-    told = ", ".join(printable(name[:40]) for name in unknown[:_NAMES_TOLD])
-    more = f" and {len(unknown) - _NAMES_TOLD} more" if len(unknown) > _NAMES_TOLD else ""
+    told = ", ".join(printable(name[:40]) for name in unknown[:_NAMES_SHOWN])
+    more = f" and {len(unknown) - _NAMES_SHOWN} more" if len(unknown) > _NAMES_SHOWN else ""
     found = f"{len(unknown)} columns of the forces that are not understood: {told}{more}"
     expected = "force, point and moment of each plate, by axis"
     about = Finding("columns", "", found, expected, "left them out", "info")

@@ -16,7 +16,7 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M
 SIDES = ("l", "r")
 _NOBODY, _LEFT, _RIGHT, _SHARED, _UNCLEAR = -1, 0, 1, 2, 3
 _NEARER = 0.5  # of the other foot's distance: so near a centre of pressure is under one foot alone
-_AGREE = 0.95  # of a contact's frames, where the centre of pressure alone tells the foot
+_AGREE = 0.95  # of a contact's frames, where the centre of pressure alone shows the foot
 _AROUND_S = 0.05  # about a load: what the plate reads below the threshold is still the foot's
 
 
@@ -37,7 +37,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class FootForces:
-    """What the plates tell of each foot.
+    """What the plates show of each foot.
 
     wrench : by side, (N, 6) on the foot about the world's origin; zero in the air, NaN where not
         known. plate : by side, (N, P) which plates bear it.

@@ -76,7 +76,7 @@ class PlateFit:
     of_sensors: float
 
     def log_likelihood_of_nobody(self) -> float:
-        """The part that tells readings from one another, and no person from nobody."""
+        """The part that distinguishes readings from one another, and no person from nobody."""
         return float(lever_log_likelihood(self.found).sum()) + self.of_sensors
 
     def evidence(self) -> Evidence:

@@ -167,7 +167,7 @@ class ForceOnPoint:
             [
                 np.column_stack([zero, force[:, 2], -force[:, 1]]),
                 np.column_stack([-force[:, 2], zero, force[:, 0]]),
-                # A thin plate: its height, told by little horizontal force, is near the floor.
+                # A thin plate: its height, known by little horizontal force, is near the floor.
                 [[0.0, 0.0, np.abs(force[:, 2]).max(initial=1.0)]],
             ]
         )

@@ -20,7 +20,7 @@ from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import by_segment, handedness
-from bsip_cli.recordings.settle import AGAINST, SessionReading, Verdict, settle_session
+from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import FORCE_UNITS_N, Written
@@ -60,7 +60,7 @@ def read_recording(path: Path) -> Recording:
     This trial alone decides how its numbers are to be understood.
     """
     opened = open_recording(path)
-    return assemble(opened, settle_session([TrialSamples.of(opened)]))
+    return assemble(opened, session_reading([TrialSamples.of(opened)]))
 
 
 def open_recording(path: Path) -> Opened:
@@ -142,7 +142,7 @@ def _without_missing(
 ) -> tuple[list[Plate], list[Finding]]:
     """Unusable while a plate that is left out is loaded: the others are not the whole force then.
 
-    Where a plate has an outline, the feet tell when somebody stands on it.
+    Where a plate has an outline, the feet show when somebody stands on it.
     """
     alone, findings = np.array(True), []
     for source in missing:
@@ -244,19 +244,21 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         return [Finding("plate_repeated", name, found, expected, action, "corrected")]
     if verdict.refusal:
         action = f"left the plate out: {_TRIED}. {_LOOK_AT[verdict.refusal == AGAINST]}"
-        if verdict.rivals:
+        if verdict.alternatives:
             action = (
-                f"left the plate out: {' or '.join(verdict.rivals)}: these trials cannot tell; one "
+                f"left the plate out: {' or '.join(verdict.alternatives)}: these trials do not "
+                "show which; one "
                 f"with more movement might. {_LOOK_AT[False]}"
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
     if verdict.doubted:
         is_moment = verdict.doubted == "vertical moment"
-        found = f"its {verdict.doubted}: {' or '.join(verdict.rivals)}: these trials cannot tell"
+        found = f"its {verdict.doubted}: {' or '.join(verdict.alternatives)}: these trials do not "
+        found += "show which"
         expected = "one that moves the body as the markers do"
         action = "took it as it stands; a movement that "
-        action += f"{'turns the body' if is_moment else 'pushes the body more'} would tell"
+        action += f"{'turns the body' if is_moment else 'pushes the body more'} would show it"
         check = "plate_moment" if is_moment else "plate_force"
         findings.append(Finding(check, name, found, expected, action, "warning"))
     if words := reading.words():

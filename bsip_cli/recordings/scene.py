@@ -24,7 +24,7 @@ _INCH_M = 0.0254
 _GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
 _FRAMES_LOOKED_AT = 500
 _TOLD = 3
-_FEW = 100  # frames by which a stature is told
+_FEW = 100  # frames by which a stature is found
 _LEAST, _MOST = 0.65, 1.5  # of the stated height: people sit, and markers sit on hats
 _PEOPLE_M = (0.6, 2.4)  # from one year on
 # The highest marker's distance from the feet over the stature, by the part that it sits on.
@@ -42,7 +42,7 @@ _CLEARLY_ABOVE_M = 0.2
 _CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
 
-_FEW_FRAMES = 50  # by which sides are told
+_FEW_FRAMES = 50  # by which sides are found
 _CLEAR = 0.6  # sine of the angle from ahead to the right: 1 in a person who stands square
 
 # What is in front and behind, and what has a left and a right one, by landmarks without sides.
@@ -61,14 +61,14 @@ _SIDED_PARTS = {
 # --- the unit of length ---------------------------------------------------------------------------
 
 
-def settle_unit(
+def decided_unit(
     positions: np.ndarray, labels: Sequence[str], stated: str, name: str
 ) -> tuple[float, list[Finding]]:
     """Size of the unit in metres, and a finding where the file's statement cannot be taken.
 
     ``positions`` (n_frames, n_markers, 3) as written, NaN = missing; ``stated`` is the file's
-    word and ``name`` its place. The stature that the labels tell decides: a stated unit must make
-    a person, else the one does that makes a person most like others. Of markers that tell no
+    word and ``name`` its place. The stature by the labels decides: a stated unit must make
+    a person, else the one does that makes a person most like others. Of markers that show no
     stature their extent decides, where it fits a person in another unit only.
     """
     stated_m = length_in_m(stated)
@@ -170,22 +170,22 @@ def height_m(markers_m: Mapping[str, np.ndarray]) -> float | None:
 
 @dataclass(frozen=True)
 class Stature:
-    """How tall the markers make a person who stands on flat feet, told by the highest ``part``."""
+    """How tall the markers make a person who stands on flat feet, by the highest ``part``."""
 
     height_m: float
     part: str
 
     @classmethod
     def of_all(cls, trials: Sequence[Stature | None]) -> Stature | None:
-        """Median over those that are told by the part that tells it best; None without any."""
+        """Median over those by the part that shows it best; None without any."""
         told = [one for one in trials if one is not None]
         part = next((name for name in _PARTS if any(one.part == name for one in told)), None)
         heights = [one.height_m for one in told if one.part == part]
         return cls(float(np.median(heights)), part) if part is not None else None
 
     def against(self, stated_m: float) -> tuple[str, str, str] | None:
-        """What was found, what was expected, what to do; None where markers cannot tell both from
-        each other."""
+        """What was found, what was expected, what to do; None where markers cannot
+        distinguish both."""
         percent = 100.0 * (self.height_m / stated_m - 1.0)
         if abs(percent) <= _STATURE_PERCENT:
             return None
@@ -321,7 +321,7 @@ def up_from_surface(
     """The lab axis nearest to the floor's normal, its sign from the markers above the floor.
 
     ``normals`` (n, 3) of either sign, ``points_on_floor_m`` (n, 3), ``markers_m``
-    (n_frames, n_markers, 3), all in the lab frame. None if nothing settles the sign.
+    (n_frames, n_markers, 3), all in the lab frame. None if nothing shows the sign.
     """
     axis = int(np.argmax(np.abs(normals).sum(axis=0)))
     seen = markers_m[np.isfinite(markers_m).all(axis=-1)]

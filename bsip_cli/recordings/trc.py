@@ -13,7 +13,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.model import Finding, refusal
-from bsip_cli.recordings.scene import settle_unit, without_absurd, without_sentinels
+from bsip_cli.recordings.scene import decided_unit, without_absurd, without_sentinels
 from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,
@@ -66,7 +66,7 @@ def read_trc(path: Path) -> Trc:
     labels, positions = rows.labelled()
     about_points = without_sentinels(positions)
     unit = fields.get("units", "")
-    size, about_unit = settle_unit(positions, labels, unit, "Units")
+    size, about_unit = decided_unit(positions, labels, unit, "Units")
     positions *= size
     times, rates = np.array(rows.times), [_number(fields.get(name, "")) for name in _RATES]
     n_stated, n_frames = (_number(fields.get(name, "")) for name in ("nummarkers", "numframes"))

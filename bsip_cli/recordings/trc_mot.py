@@ -162,23 +162,23 @@ def _forces(
     mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int, pace: float
 ) -> _Forces:
     if mot is None:
-        return _Forces(markers.rate_hz, note="no .mot file of the same name beside the .trc")
+        return _Forces(markers.rate_hz, note="no .mot file of the same name next to the .trc")
     if note := _unplaced(mot):
         return _Forces(markers.rate_hz, note=note, findings=mot.findings)
-    settled, grid = _settle_force_times(mot.stamps.faster(pace), markers), None
-    findings = [*mot.findings, *settled.findings]
-    if settled.stamps is not None:
-        grid = even_grid(settled.stamps, settled.rates_hz, markers.rate_hz)
-        if grid is not None and settled.is_simultaneous:
-            torn_off_s = grid.time_s[0] - settled.stamps.values[0] if grid.samples.start else 0.0
+    decided, grid = _force_times(mot.stamps.faster(pace), markers), None
+    findings = [*mot.findings, *decided.findings]
+    if decided.stamps is not None:
+        grid = even_grid(decided.stamps, decided.rates_hz, markers.rate_hz)
+        if grid is not None and decided.is_simultaneous:
+            torn_off_s = grid.time_s[0] - decided.stamps.values[0] if grid.samples.start else 0.0
             grid = grid.from_time(markers.first_s + torn_off_s)
     if grid is None:
-        note = settled.note or _UNEVEN
+        note = decided.note or _UNEVEN
         return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
     last = markers.lasts_s() * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
         rows = len(mot.stamps.values)
-        note = f"the .mot has {rows} rows and {last:.3g} would be needed beside the .trc"
+        note = f"the .mot has {rows} rows and {last:.3g} would be needed for the .trc"
         return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
     samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
     read = [_source(force, grid, samples_s, rotation, markers) for force in mot.forces]
@@ -299,7 +299,7 @@ class _ForceTimes:
     is_simultaneous: bool = False  # they begin with the markers, whatever the stamps say
 
 
-def _settle_force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
+def _force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
     """Unit and zero of the forces' times.
 
     Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
@@ -310,10 +310,10 @@ def _settle_force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
         increase = np.isfinite(stamps.values).all() and stamps.step() > 0
     if len(stamps.values) < 2 or not increase:
         return _ForceTimes(None, (), _UNEVEN)
-    settled = _in_seconds(stamps, markers)
-    if settled.stamps is None or settled.is_simultaneous:
-        return settled
-    return _from_one_zero(settled, markers)
+    decided = _in_seconds(stamps, markers)
+    if decided.stamps is None or decided.is_simultaneous:
+        return decided
+    return _from_one_zero(decided, markers)
 
 
 def _in_seconds(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
@@ -345,13 +345,13 @@ def _in_seconds(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
     return _ForceTimes(stamps.times(possible[name]), (said,))
 
 
-def _from_one_zero(settled: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
+def _from_one_zero(decided: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
     """Both clocks zeroed alike where nothing else can be; a note where they share no time."""
-    assert settled.stamps is not None
-    times = settled.stamps.values
+    assert decided.stamps is not None
+    times = decided.stamps.values
     first, last = float(times.min()), float(times.max())
-    near = 1 / markers.rate_hz + settled.stamps.step()
-    is_as_long = abs((last - first) - markers.lasts_s()) <= near + settled.stamps.digits[1]
+    near = 1 / markers.rate_hz + decided.stamps.step()
+    is_as_long = abs((last - first) - markers.lasts_s()) <= near + decided.stamps.digits[1]
     apart_s = abs(first - markers.first_s)
     overlap_s = min(last, markers.first_s + markers.lasts_s()) - max(first, markers.first_s)
     is_together = overlap_s > min(near, 0.5 * (last - first))
@@ -361,7 +361,7 @@ def _from_one_zero(settled: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
     # Clocks that were started apart do not stop after the same time: both files were cut alike.
     if is_as_long and not (is_together and markers.unsure_s < apart_s <= near):
         if apart_s <= (markers.unsure_s if is_together and not counts_frames else near):
-            return replace(settled, is_simultaneous=True)  # within what is printed
+            return replace(decided, is_simultaneous=True)  # within what is printed
         if counts_frames and is_together:
             found += ": as long, and those count frames"
         elif is_together:
@@ -370,15 +370,15 @@ def _from_one_zero(settled: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
         else:
             found += ": as long, and never at once"
     elif not is_together:
-        return replace(settled, stamps=None, note=found)
+        return replace(decided, stamps=None, note=found)
     elif counts_frames and apart_s > near:
         found, level = f"{found}: perhaps from another zero", "warning"
         action = "took both as written; if they were cut alike, give them the same first time"
     else:
-        return settled
+        return decided
     said = Finding("time", "", found, "one clock", action, level)
-    findings = (*settled.findings, said)
-    return replace(settled, is_simultaneous=is_as_long, findings=findings)
+    findings = (*decided.findings, said)
+    return replace(decided, is_simultaneous=is_as_long, findings=findings)
 
 
 def _span(first_s: float, last_s: float) -> str:

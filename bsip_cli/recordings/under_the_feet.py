@@ -27,7 +27,7 @@ BESIDE_M = 0.12
 _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
 _LITTLE_TORQUE_M = 3e-5  # below it the likelihood falls too: soles hardly make less
 _LEAN, _ASTRAY = 0.63, 0.18  # of the slope to the body, and half of all are so far from it
-_PLACE_M = 0.024  # the markers tell where the body is, to this: see balance_median_m
+_PLACE_M = 0.024  # the markers show where the body is, to this: see balance_median_m
 _LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance
 _LEAST = 1e-9
 _RARE = -4.6  # an outline is stated wrongly, vertical moments are left out, in one file of 100
@@ -183,8 +183,8 @@ def log_likelihood(found: np.ndarray) -> np.ndarray:
 
 
 def lever_log_likelihood(found: np.ndarray) -> np.ndarray:
-    """The part of how the moments go with a lever about the sensor: it tells readings from one
-    another, and no person from nobody, since a file may give moments about its own origin."""
+    """The part of how the moments go with a lever about the sensor: it distinguishes readings, and
+    no person from nobody, since a file may give moments about its own origin."""
     return np.nan_to_num(2.0 * np.log(np.clip(found[..., 3] / _LEVER_M, _LEAST, 1.0)))
 
 

@@ -1,5 +1,5 @@
-"""What text files hardly ever say, or say wrongly: the unit of their forces (a MOT is meant to be in
-N), and the rate of the markers or of the forces, each of which has a file with times of its own."""
+"""What text files hardly ever say, or say wrongly: the unit of their forces (a MOT is meant to be
+in N), and the rate of the markers or of the forces, each of which has times of its own."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _AFTER_STEP_S = 0.1  # beside a frame that is not clear
 
 @dataclass(frozen=True, eq=False)
 class PlateZero:
-    """A plate's reading in its unloaded stretches."""
+    """A plate's reading in its unloaded intervals."""
 
     offset: np.ndarray  # (6,): N and N m about the world origin
     n_samples: int  # 0: the plate was never seen unloaded, the offset is zero
@@ -38,7 +38,7 @@ class PlateZero:
 
 
 def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = None) -> PlateZero:
-    """Find unloaded stretches: long, low and quiet in the vertical force.
+    """Find unloaded intervals: long, low and quiet in the vertical force.
 
     The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near, or the
     plate reads a steady pull: it was set to zero under the person.
@@ -85,7 +85,7 @@ def _zero_of(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> PlateZero:
 
 def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
     """The plate without its offset, and the line for the quality table."""
-    found, action, level = "no quiet stretch without load", "left its zero as it is", "info"
+    found, action, level = "no quiet interval without load", "left its zero as it is", "info"
     if zero.is_known():
         seconds = sum(stop - start for start, stop in zero.stretches_s)
         force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])

@@ -23,11 +23,11 @@ from bsip_cli.recordings.contacts import (
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
+from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
 from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
+from bsip_cli.recordings.momentum_mass import Interval, intervals_of, upright_frames
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.told_mass import mass_finding, plates_apart, told_mass
 from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
@@ -160,7 +160,7 @@ def _contacts(
     segments: list[str],
     loads: tuple[PlateLoad, ...],
     stated: StatedMass | None,
-) -> tuple[ContactWindows, tuple[Stretch, ...], list[Finding]]:
+) -> tuple[ContactWindows, tuple[Interval, ...], list[Finding]]:
     """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
@@ -168,14 +168,14 @@ def _contacts(
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
     feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
-    intervals = stretches_of(markers, feet.total_N, shown, rate_hz)
+    intervals = intervals_of(markers, feet.total_N, shown, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
     alone = {
-        load.name: stretches_of(markers, load.force_z_N, shown & bears_alone(load, loads), rate_hz)
+        load.name: intervals_of(markers, load.force_z_N, shown & bears_alone(load, loads), rate_hz)
         for load in loads
     }
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
-    about_mass += plates_apart(alone, stated_kg, unit.config.ingest.mass_gross_percent)
+    about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
@@ -183,7 +183,7 @@ def _contacts(
 
 
 def _mass_on_plates(
-    unit: Unit, stated: StatedMass | None, intervals: tuple[Stretch, ...]
+    unit: Unit, stated: StatedMass | None, intervals: tuple[Interval, ...]
 ) -> tuple[float | None, float | None, list[Finding]]:
     """The mass [kg] on the plates, known loads included, what the trial's plates show for sure, and
     what is said of both.
@@ -193,9 +193,9 @@ def _mass_on_plates(
     """
     options = unit.config.ingest
     height_m = unit.person.height_m if stated is None else None
-    measured = told_mass({unit.name: intervals}, options.mass_half_width_percent, height_m)
+    measured = measured_mass({unit.name: intervals}, options.mass_half_width_percent, height_m)
     if stated is not None and not measured.is_known:
-        measured = told_mass({unit.name: intervals}, VAGUE_PERCENT)
+        measured = measured_mass({unit.name: intervals}, VAGUE_PERCENT)
     comparison = compared(unit, stated, measured, unit.load_kg())
     about = [mass_finding(measured, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)

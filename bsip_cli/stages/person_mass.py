@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.recordings.momentum_mass import Stretch
-from bsip_cli.recordings.told_mass import Comparison, ToldMass, told_mass
+from bsip_cli.recordings.measured_mass import Comparison, MeasuredMass, measured_mass
+from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import load_words
 from bsip_cli.study.study import Trial
@@ -46,7 +46,7 @@ def stated_mass(unit: Unit, *facts: dict) -> StatedMass | None:
 def compared(
     unit: Unit,
     stated: StatedMass | None,
-    measured: ToldMass,
+    measured: MeasuredMass,
     load_kg: float,
     height_m: float | None = None,
 ) -> Comparison | None:
@@ -62,10 +62,12 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     """From what is stated and the intervals that ingest found in these trials; warns."""
     intervals = {}
     for trial in trials:
-        records = map(Stretch.of, unit.facts("wrench", trial)["mass_stretches"])
+        records = map(Interval.of, unit.facts("wrench", trial)["mass_stretches"])
         intervals[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
     static = {trial.stem for trial in trials if trial.role == "static"}
-    measured = told_mass(intervals, unit.config.ingest.mass_half_width_percent, height_m, static)
+    measured = measured_mass(
+        intervals, unit.config.ingest.mass_half_width_percent, height_m, static
+    )
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""
@@ -76,7 +78,9 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
         note = f"mass is not known: put mass_kg into participants.tsv, because {measured.reason}"
         unit.say(note)
         return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
-    vague = measured if measured.is_known else told_mass(intervals, VAGUE_PERCENT, static=static)
+    vague = (
+        measured if measured.is_known else measured_mass(intervals, VAGUE_PERCENT, static=static)
+    )
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
         unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")
@@ -96,7 +100,7 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
 def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
     """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
     none; else nothing is known to be wrong with either, and the stated one stays."""
-    measured = comparison.told
+    measured = comparison.measured
     plates_kg = measured.mass_kg if is_sure else float("nan")
     sentence = comparison.sentence(stated.source)
     if not comparison.likely():

@@ -21,7 +21,7 @@ from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import findings_about, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
-from bsip_cli.recordings.settle import SessionReading, Verdict, settle_written
+from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.recordings.written import AS_WRITTEN, Written
@@ -54,7 +54,7 @@ def run(unit: Unit) -> None:
         _say_height(unit, seen)
         stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
         read = partial(_surveyed, unit, mine, limits)
-        reading = settle_written(seen, read, *stated, limits)
+        reading = reading_of_files(seen, read, *stated, limits)
         rows += rows_of(session or "", reading)
         for name, of_trials in facts.items():
             of_trials |= getattr(reading, name)
@@ -150,7 +150,7 @@ def _row(verdict: Verdict) -> dict:
     places = *(row.pop("centre_m") or [nothing] * 3), *(row.pop("half_size_m") or [nothing] * 2)
     row |= {"reversed_round": row.pop("mirrored"), "refusal": verdict.refusal}
     row |= dict(zip((*_CENTRE, *_HALF), places, strict=True)) | {"doubted": verdict.doubted}
-    row |= {"rivals": "|".join(verdict.rivals), "repeats": " ".join(verdict.repeats)}
+    row |= {"rivals": "|".join(verdict.alternatives), "repeats": " ".join(verdict.repeats)}
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
     for when, found in (("before", verdict.before), ("after", verdict.after)):
         row |= {f"{when}_{name}": value for name, value in asdict(found or unknown).items()}
@@ -171,9 +171,11 @@ def _verdict(row: dict) -> Verdict:
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
-    rivals, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
+    others, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
     said = {"refusal": row["refusal"], "doubted": row["doubted"]}
-    return Verdict(reading, before, after, rivals=tuple(rivals), repeats=tuple(repeats), **said)
+    return Verdict(
+        reading, before, after, alternatives=tuple(others), repeats=tuple(repeats), **said
+    )
 
 
 def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:

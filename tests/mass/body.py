@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.momentum_mass import Stretch, stretches_of
+from bsip_cli.recordings.momentum_mass import Interval, intervals_of
 
 RATE_HZ = 100.0
 HEIGHTS_M = {
@@ -44,10 +44,10 @@ def told(
     size_m: float = 0.0,
     borne_N: np.ndarray | float = 0.0,
     ahead_m: float = 0.0,
-) -> tuple[Stretch, ...]:
+) -> tuple[Interval, ...]:
     """Stretches of a trial in which something else bears ``borne_N``."""
     path, acceleration = rise(seconds, size_m)
     force = mass_kg * (GRAVITY_M_S2 + acceleration) - borne_N
     noise = np.random.default_rng(1).normal(0.0, 1.0, len(force))
     everywhere = np.ones(len(force), bool)
-    return stretches_of(markers(path, ahead_m), force + noise, everywhere, RATE_HZ)
+    return intervals_of(markers(path, ahead_m), force + noise, everywhere, RATE_HZ)

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_told_masses_are_true(kind):
+def test_measured_masses_are_true(kind):
     found = answer(kind, 4)
     assert not found.told.is_known or found.is_covered
     if kind in ("static", "squats", "steps", "walking, two plates", "jumps"):

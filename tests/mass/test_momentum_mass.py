@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.momentum_mass import Stretch, segment_motion, stretches_of
-from bsip_cli.recordings.told_mass import told_mass
+from bsip_cli.recordings.measured_mass import measured_mass
+from bsip_cli.recordings.momentum_mass import Interval, intervals_of, segment_motion
 from tests.mass.body import RATE_HZ, markers, rise, told
 
 MOST_PERCENT = 10.0
 
 
-def mass_of(*trials: tuple[Stretch, ...], **more):
-    return told_mass({f"trial-{k}": each for k, each in enumerate(trials)}, MOST_PERCENT, **more)
+def mass_of(*trials: tuple[Interval, ...], **more):
+    return measured_mass(
+        {f"trial-{k}": each for k, each in enumerate(trials)}, MOST_PERCENT, **more
+    )
 
 
 @pytest.mark.parametrize("size_m", [0.0, 0.02, 0.1])
@@ -33,7 +35,7 @@ def test_the_mean_force_of_a_part_of_a_stride_is_not_taken_for_the_weight(start)
     force = 62.0 * (GRAVITY_M_S2 + acceleration)
     measured = np.zeros(300, bool)
     measured[start : start + 40] = True
-    (one,) = stretches_of(markers(path), force, measured, RATE_HZ)
+    (one,) = intervals_of(markers(path), force, measured, RATE_HZ)
     assert abs(force[measured].mean() / GRAVITY_M_S2 / 62.0 - 1) > 0.02
     assert one.mass_kg == pytest.approx(62.0, rel=0.01)
 
@@ -75,12 +77,12 @@ def test_nothing_on_the_plates_and_no_trunk_tell_nothing():
     assert told(0.0) == ()
     everywhere = np.ones(300, bool)
     force = np.full(300, 600.0)
-    assert stretches_of({"foot_l": np.zeros((300, 2, 3))}, force, everywhere, RATE_HZ) == ()
-    assert stretches_of(markers(np.zeros(300)), force, ~everywhere, RATE_HZ) == ()
+    assert intervals_of({"foot_l": np.zeros((300, 2, 3))}, force, everywhere, RATE_HZ) == ()
+    assert intervals_of(markers(np.zeros(300)), force, ~everywhere, RATE_HZ) == ()
 
 
 def test_a_stretch_comes_back_from_a_file_and_without_a_load():
     (one, *_) = told(62.0)
-    assert Stretch.of(json.loads(json.dumps(one.record()))) == one
+    assert Interval.of(json.loads(json.dumps(one.record()))) == one
     assert one.without(10.0).mass_kg == pytest.approx(one.mass_kg - 10.0)
     assert one.without(10.0).own_sd == pytest.approx(one.own_sd * one.mass_kg / (one.mass_kg - 10))

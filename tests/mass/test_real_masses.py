@@ -8,8 +8,8 @@ import pytest
 
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import STAGES
-from bsip_cli.recordings.momentum_mass import Stretch
-from bsip_cli.recordings.told_mass import ToldMass, told_mass
+from bsip_cli.recordings.measured_mass import MeasuredMass, measured_mass
+from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study
@@ -37,7 +37,7 @@ NOTHING = (
 )
 
 
-def told(data: Path, name: str, folder: Path) -> ToldMass:
+def told(data: Path, name: str, folder: Path) -> MeasuredMass:
     """What one recording tells alone."""
     source = data / name
     study = folder / source.stem
@@ -56,8 +56,8 @@ def told(data: Path, name: str, folder: Path) -> ToldMass:
     survey.run(Unit(STAGES[0], found, out, config, person))
     unit = Unit(STAGES[1], found, out, config, person, person.trials[0])
     ingest.run(unit)
-    stretches = [Stretch.of(record) for record in unit.facts("wrench")["mass_stretches"]]
-    return told_mass({name: stretches}, config.ingest.mass_half_width_percent)
+    stretches = [Interval.of(record) for record in unit.facts("wrench")["mass_stretches"]]
+    return measured_mass({name: stretches}, config.ingest.mass_half_width_percent)
 
 
 @pytest.mark.parametrize("moving", sorted(set(MOVING) - set(NOTHING)))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.recordings.told_mass import Comparison, ToldMass, mass_finding, unknown
+from bsip_cli.recordings.measured_mass import Comparison, MeasuredMass, mass_finding, unknown
 
 
 def compared(stated_kg: float, plates_kg: float, load_kg: float = 0.0, height_m=1.74):
-    told = ToldMass(plates_kg, 0.006, 3.0, 2)
+    told = MeasuredMass(plates_kg, 0.006, 3.0, 2)
     return Comparison(stated_kg, load_kg, told, 2.0, 15.0, height_m)
 
 

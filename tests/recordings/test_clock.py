@@ -11,7 +11,7 @@ from bsip_cli.recordings.clock import lags
 from bsip_cli.recordings.plate_reading import FrameChange
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import assemble, open_recording
-from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.session_reading import session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from tests.recordings.standing_on_two_plates import RATE_HZ, N, motion, of_c3d, of_table, opened
 
@@ -35,7 +35,7 @@ REAL = {  # one of each: quiet on one leg, squats, gait, golf, jump, sitting dow
 
 
 def session_of(trial: Opened, *others: Opened):
-    return settle_session([TrialSamples.of(one) for one in (trial, *others)])
+    return session_reading([TrialSamples.of(one) for one in (trial, *others)])
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])

@@ -19,7 +19,7 @@ from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plates import CHANNELS_OF
 from bsip_cli.recordings.read import findings_about, open_recording, read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
-from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.session_reading import session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 
 pytestmark = pytest.mark.real
@@ -189,7 +189,7 @@ def test_kistlers_polynomial_gives_the_centre_of_pressure_of_ezc3d(real_data, na
 )
 def test_centre_of_pressure_lies_under_the_feet(real_data, name):
     """Of every loaded plate, to a foot's breadth: two markers on a foot tell no more."""
-    session = settle_session([TrialSamples.of(open_recording(real_data / name))])
+    session = session_reading([TrialSamples.of(open_recording(real_data / name))])
     distances = np.array([verdict.after.distance_m for verdict in session.plates.values()])
     loaded = distances[np.isfinite(distances)]
     assert len(loaded) and loaded.max() < 0.1
@@ -258,7 +258,7 @@ def test_squat_moves_as_the_force_says(real_data):
 )
 def test_vertical_moments_go_with_the_turning_body(real_data, names, words):
     trials = [TrialSamples.of(open_recording(real_data / name)) for name in names]
-    found = findings_about(settle_session(trials))
+    found = findings_about(session_reading(trials))
     assert bool(words) == bool(found)
     assert all(words in finding.action for finding in found)
 
@@ -281,7 +281,7 @@ def test_exchanged_corners_of_a_plate_with_eight_sensors(real_data, plate, one, 
         sources = list(trial.sources)
         sources[plate] = replace(sources[plate], measured=sources[plate].measured[:, columns])
         changed.append(replace(trial, sources=tuple(sources)))
-    session = settle_session([TrialSamples.of(trial) for trial in changed])
+    session = session_reading([TrialSamples.of(trial) for trial in changed])
     done = {n: v.reading.channels for n, v in session.plates.items() if v.reading.channels}
     assert done == ({name: f"exchanged {one} and {other}"} if one else {})
     assert not any(v.refusal or v.doubted for v in session.plates.values())

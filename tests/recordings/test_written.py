@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.recordings.read import findings_about, open_recording
-from bsip_cli.recordings.settle import settle_written
+from bsip_cli.recordings.session_reading import reading_of_files
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written, force_unit, likely_paces
 
@@ -98,7 +98,7 @@ def settled(paths: list[Path], stated_kg: float | None = 62.6):
     def read(written: Written):
         return [TrialSamples.of(one.as_written(written)) for one in opened]
 
-    return settle_written(read(AS_WRITTEN), read, stated_kg, None, 15.0)
+    return reading_of_files(read(AS_WRITTEN), read, stated_kg, None, 15.0)
 
 
 def test_sound_files_are_read_as_they_are(real_data):

@@ -54,17 +54,17 @@ class Verdict:
     """How a plate is understood, or why it is left out (``refusal``, a clause).
 
     ``before`` and ``after``: what its numbers make as the file says, and as they are understood,
-    where that differs. ``rivals``: repairs that would each explain a plate, and that cannot be
-    told apart: it is left out, or what is ``doubted`` is said: its vertical moment where only that
-    differs, its force where it is likeliest as the file says. ``repeats`` names the plates whose
-    copy or sum it is.
+    where that differs. ``alternatives``: repairs that would each explain a plate, and that cannot
+    be distinguished: it is left out, or what is ``doubted`` is said: its vertical moment where only
+    that differs, its force where it is likeliest as the file says. ``repeats`` names the plates
+    whose copy or sum it is.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
     before: Evidence | None = None
     after: Evidence | None = None
     refusal: str = ""
-    rivals: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
     doubted: Doubted = ""
     repeats: tuple[str, ...] = ()
 
@@ -93,7 +93,7 @@ class SessionReading:
         return self.log_posterior + DELAYED * len(self.delays_s)
 
 
-def settle_written(
+def reading_of_files(
     trials: Sequence[TrialSamples],
     read: Callable[[Written], Sequence[TrialSamples]],
     stated_kg: float | None,
@@ -101,7 +101,7 @@ def settle_written(
     gross_percent: float,
     limits: GateLimits = USUAL,
 ) -> SessionReading:
-    """`settle_session` of trials as their files say, or ``read`` otherwise: with forces of another
+    """`session_reading` of trials as their files say, or ``read`` otherwise: with forces of another
     unit than N, or of markers or forces of another rate than the stated one.
 
     stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
@@ -113,12 +113,12 @@ def settle_written(
         if name := force_unit(float(np.median(masses)), stated_kg, height_m, gross_percent):
             written = Written(FORCE_UNITS_N[name])
             trials = read(written)
-    found, surely = settle_session(trials, limits), limits.corrected_percent / 100
+    found, surely = session_reading(trials, limits), limits.corrected_percent / 100
     now, best = found.with_delays(), replace(found, written=written)
     most = float(np.log(surely / (1 - surely)))
     for pace, odds in likely_paces([one.lengths for one in trials]).items():
         other = replace(written, pace=pace)
-        found = settle_session(read(other), limits)
+        found = session_reading(read(other), limits)
         if (gain := found.with_delays() + odds - now) > most:
             best, most = replace(found, written=other), gain
     if (pace := best.written.pace) == 1.0:
@@ -128,27 +128,27 @@ def settle_written(
     of_forces = float(expit(log_odds_of(best.of_paces, 1 / pace)))
     if of_forces >= surely:
         other = replace(written, force_pace=1 / pace)
-        return replace(settle_session(read(other), limits), written=other)
+        return replace(session_reading(read(other), limits), written=other)
     doubted = replace(best.written, probability=1 - of_forces)
     return best if 1 - of_forces >= surely else replace(best, written=doubted)
 
 
-def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
+def session_reading(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
     """The axes and the plates' readings that make a person of a session, and the delays of single
     trials: what either may explain, the likelier does."""
     surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
-    best = _settled(trials, limits)
+    best = _reading(trials, limits)
     for k, trial in enumerate(trials):
         if trial.late is not None:
             others = [*trials[:k], trial.late, *trials[k + 1 :]]
-            other = _settled(others, limits)
+            other = _reading(others, limits)
             if other.log_posterior + DELAYED - best.log_posterior > surely:
                 trials, best = others, other
     delays = {trial.name: trial.delay_s for trial in trials if trial.delay_s}
     return replace(best, delays_s=delays)
 
 
-def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
+def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
     is_mirrored = Handedness.of_all([trial.hands for trial in trials]).is_mirrored
     changes = MIRRORS if is_mirrored else (FrameChange(), *FORCES_MOVED)
     repeats = repeated_plates([trial.sources for trial in trials])
@@ -176,18 +176,18 @@ def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    """The hypothesis that is believed; and, where the trials cannot tell it from others, the
+    """The hypothesis that is believed; and, where the trials cannot distinguish it from others, the
     repairs of each plate that would do, in words, and what of it is in doubt, if it is believed
     all the same; or none makes a person."""
 
     of: Hypothesis
-    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     doubted: Doubted = ""
     is_no_person: bool = False
 
     @property
     def is_sure(self) -> bool:
-        return not (self.rivals or self.is_no_person)
+        return not (self.alternatives or self.is_no_person)
 
 
 def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
@@ -208,7 +208,7 @@ def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
 
 
 def _surest(tried: Sequence[Hypothesis]) -> _Choice:
-    """The surest; the first, with rivals, if none is sure."""
+    """The surest; the first, with alternatives, if none is sure."""
     now, limits = tried[0], tried[0].limits
     believed, corrected = limits.believed_percent / 100, limits.corrected_percent / 100
     logs = np.array([one.log_posterior for one in tried])
@@ -234,26 +234,26 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
         return _Choice(best)
     some = [now, *(tried[k] for k in likely if logs[k] > np.log(1 - corrected))]
     words = {name: dict.fromkeys(one.words(name, now) for one in some) for name in now.fits}
-    rivals = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {AS_IT_IS}}
+    alternatives = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {AS_IT_IS}}
     if all(now.is_alike(one, torque=False) for one in some):
-        return _Choice(now, rivals, "vertical moment")
-    return _Choice(now, rivals, _ALL if best is now and not now.frame.moved else "")
+        return _Choice(now, alternatives, "vertical moment")
+    return _Choice(now, alternatives, _ALL if best is now and not now.frame.moved else "")
 
 
 # --- what is said of it -----------------------------------------------------------------------
 
 
 def _verdict(stated: PlateFit, chosen: _Choice, name: str) -> Verdict:
-    fit, rivals = chosen.of.fits[name], chosen.rivals.get(name, ())
+    fit, alternatives = chosen.of.fits[name], chosen.alternatives.get(name, ())
     before, after = stated.evidence(), fit.evidence()
     fault = _fault(after)
     if not fault and not chosen.doubted:
-        fault = _UNTOLD if rivals else AGAINST if chosen.is_no_person else ""
+        fault = _UNTOLD if alternatives else AGAINST if chosen.is_no_person else ""
     if fault:
-        return Verdict(fit.reading, before, after, refusal=fault, rivals=rivals)
+        return Verdict(fit.reading, before, after, refusal=fault, alternatives=alternatives)
     is_loaded = np.isfinite([after.distance_m, after.outside_m]).any()
-    doubted: Doubted = chosen.doubted if rivals and is_loaded else ""
-    return Verdict(_with_outline(fit), before, after, rivals=rivals, doubted=doubted)
+    doubted: Doubted = chosen.doubted if alternatives and is_loaded else ""
+    return Verdict(_with_outline(fit), before, after, alternatives=alternatives, doubted=doubted)
 
 
 def _fault(found: Evidence) -> str:

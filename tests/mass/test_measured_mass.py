@@ -4,33 +4,33 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.recordings.told_mass import mass_finding, plates_apart, told_mass
+from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
 from tests.mass.body import told
 
 
 def test_more_stretches_tell_more():
-    one, many = (told_mass({"a": told(62.0, s, 0.08)}, 10.0) for s in (0.8, 12.0))
+    one, many = (measured_mass({"a": told(62.0, s, 0.08)}, 10.0) for s in (0.8, 12.0))
     assert many.half_width_percent < one.half_width_percent
     assert many.stretches == 6 and many.seconds == pytest.approx(11.8, abs=0.1)
 
 
 def test_trials_that_agree_are_one():
-    found = told_mass({"a": told(62.0), "b": told(62.1), "c": told(61.9, 4.0, 0.1)}, 10.0)
+    found = measured_mass({"a": told(62.0), "b": told(62.1), "c": told(61.9, 4.0, 0.1)}, 10.0)
     assert found.mass_kg == pytest.approx(62.0, abs=0.2) and not found.remark
 
 
 @pytest.mark.parametrize("other_kg", [40.0, 57.0, 70.0])
 def test_trials_that_disagree_tell_nothing_but_for_a_static_one(other_kg):
     trials = {"static": told(62.0), "walk": told(other_kg)}
-    found = told_mass(trials, 10.0)
+    found = measured_mass(trials, 10.0)
     assert not found.is_known and "trials tell from" in found.reason
-    found = told_mass(trials, 10.0, static={"static"})
+    found = measured_mass(trials, 10.0, static={"static"})
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
     assert "the static trial counts" in found.words()
 
 
 def test_a_trial_that_tells_nothing_does_not_spoil_the_others():
-    found = told_mass({"sitting": told(62.0, ahead_m=0.8), "standing": told(62.0)}, 10.0)
+    found = measured_mass({"sitting": told(62.0, ahead_m=0.8), "standing": told(62.0)}, 10.0)
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
 
 
@@ -39,16 +39,16 @@ def test_a_trial_that_tells_nothing_does_not_spoil_the_others():
     [(31.0, 1.70, False), (250.0, 1.70, False), (27.0, 1.33, True), (62.0, 1.70, True)],
 )
 def test_the_body_mass_index_is_a_persons(mass_kg, height_m, known):
-    assert told_mass({"a": told(mass_kg)}, 10.0, height_m).is_known == known
+    assert measured_mass({"a": told(mass_kg)}, 10.0, height_m).is_known == known
 
 
 def test_an_interval_that_is_too_wide_is_no_mass():
-    found = told_mass({"a": told(62.0, 0.8, 0.1)}, 0.5)
+    found = measured_mass({"a": told(62.0, 0.8, 0.1)}, 0.5)
     assert not found.is_known and "only" in found.reason
 
 
 def test_no_trial_with_forces_is_said():
-    assert "no trial" in told_mass({}, 10.0).reason
+    assert "no trial" in measured_mass({}, 10.0).reason
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_no_trial_with_forces_is_said():
     [(70 / 4.44822, "pounds-force"), (70 / 9.80665, "kilogram-force"), (30, "")],
 )
 def test_a_mass_that_is_nobodys_is_said_with_the_likely_unit(mass_kg, unit):
-    finding = mass_finding(told_mass({"a": told(mass_kg)}, 10.0, 1.70), None, "")
+    finding = mass_finding(measured_mass({"a": told(mass_kg)}, 10.0, 1.70), None, "")
     assert finding.level == "warning" and "a person of 1.70 m has 35 to 173" in finding.found
     assert unit in finding.found and ("likely" in finding.found) == bool(unit)
 
@@ -73,7 +73,7 @@ def test_a_mass_that_is_nobodys_is_said_with_the_likely_unit(mass_kg, unit):
 )
 def test_a_plate_that_tells_another_mass_than_the_others_is_named(masses_kg, stated_kg, odd):
     plates = {str(k + 1): told(kg) for k, kg in enumerate(masses_kg)}
-    findings = plates_apart(plates, stated_kg, 15.0)
+    findings = differing_plates(plates, stated_kg, 15.0)
     assert [one.subject for one in findings] == odd
     for one in findings:
         mass_kg = masses_kg[int(one.subject) - 1]

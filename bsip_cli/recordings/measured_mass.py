@@ -1,4 +1,4 @@
-"""One mass from the stretches of all trials of a person, or why there is none, and a stated mass
+"""One mass from the intervals of all trials of a person, or why there is none, and a stated mass
 against it: agreement, a small difference, or a gross one."""
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
+from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Interval
 from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
@@ -41,8 +41,8 @@ _NEAR_CM = 3.0
 
 
 @dataclass(frozen=True)
-class ToldMass:
-    """What the plates tell: mass [kg] with its relative standard deviation, or why none.
+class MeasuredMass:
+    """What the plates measure: mass [kg] with its relative standard deviation, or why none.
 
     mass_kg is NaN where ``reason`` says why it is not known; ``remark`` is what else is to be said.
     of_nobody : it would be known, and is no person's.
@@ -51,7 +51,7 @@ class ToldMass:
     mass_kg: float
     sd: float
     seconds: float
-    stretches: int
+    intervals: int
     reason: str = ""
     remark: str = ""
     of_nobody: bool = False
@@ -73,17 +73,17 @@ class ToldMass:
         )
 
 
-def unknown(reason: str) -> ToldMass:
-    return ToldMass(float("nan"), float("nan"), 0.0, 0, reason)
+def unknown(reason: str) -> MeasuredMass:
+    return MeasuredMass(float("nan"), float("nan"), 0.0, 0, reason)
 
 
-def steady(stretches: Sequence[Stretch]) -> tuple[Stretch, ...]:
-    """Those of one trial's stretches that agree with each other.
+def steady(intervals: Sequence[Interval]) -> tuple[Interval, ...]:
+    """Those of one trial's intervals that agree with each other.
 
-    What bears a person beside the plates takes weight off them: where stretches disagree, the
+    What bears a person beside the plates takes weight off them: where intervals disagree, the
     lowest goes first.
     """
-    kept = [one for one in stretches if one.steadiness < COMES_AND_GOES]
+    kept = [one for one in intervals if one.steadiness < COMES_AND_GOES]
     while len(kept) > 1:
         whole = _combined([kept])
         z = (np.array([one.mass_kg for one in kept]) / whole.mass - 1.0) / whole.sds
@@ -94,22 +94,22 @@ def steady(stretches: Sequence[Stretch]) -> tuple[Stretch, ...]:
     return tuple(kept)
 
 
-def told_mass(
-    trials: Mapping[str, Sequence[Stretch]],
+def measured_mass(
+    trials: Mapping[str, Sequence[Interval]],
     most_percent: float,
     height_m: float | None = None,
     static: Collection[str] = (),
-) -> ToldMass:
-    """From the stretches of each trial of a person by its name.
+) -> MeasuredMass:
+    """From the intervals of each trial of a person by its name.
 
     Trials must agree; where they do not, those that are ``static`` decide, and without one nothing.
     most_percent : the widest half of the 95 % interval that still counts as known. height_m : the
     stature, for the body-mass index.
     """
     kept, reasons = {}, []
-    for name, stretches in trials.items():
-        agreeing = steady(stretches)
-        if reason := _too_little(stretches, agreeing):
+    for name, intervals in trials.items():
+        agreeing = steady(intervals)
+        if reason := _too_little(intervals, agreeing):
             reasons.append(f"{name}: {reason}" if len(trials) > 1 else reason)
         else:
             kept[name] = agreeing
@@ -118,19 +118,19 @@ def told_mass(
     if not _disagree(kept.values()):
         return _judged(list(kept.values()), most_percent, height_m)
     masses = [_combined([each]).mass for each in kept.values()]
-    differ = f"trials tell from {min(masses):.1f} to {max(masses):.1f} kg"
+    differ = f"trials show from {min(masses):.1f} to {max(masses):.1f} kg"
     at_rest = [each for name, each in kept.items() if name in static]
     if not at_rest or _disagree(at_rest):
         return unknown(differ)
-    told = _judged(at_rest, most_percent, height_m)
-    return replace(told, remark=f" ({differ}: the static trial counts)")
+    measured = _judged(at_rest, most_percent, height_m)
+    return replace(measured, remark=f" ({differ}: the static trial counts)")
 
 
-def _too_little(stretches: Sequence[Stretch], agreeing: Sequence[Stretch]) -> str:
-    """Why a trial tells nothing; empty if it does."""
-    if not stretches:
-        return "no stretch shows an upright person with both feet on the plates"
-    all_s, kept_s = (sum(one.seconds for one in some) for some in (stretches, agreeing))
+def _too_little(intervals: Sequence[Interval], agreeing: Sequence[Interval]) -> str:
+    """Why a trial shows nothing; empty if it does."""
+    if not intervals:
+        return "no interval shows an upright person with both feet on the plates"
+    all_s, kept_s = (sum(one.seconds for one in some) for some in (intervals, agreeing))
     if kept_s >= LEAST_SHARE * all_s:
         return ""
     return (
@@ -149,7 +149,7 @@ class _Whole(NamedTuple):
     sds: np.ndarray
 
 
-def _combined(trials: Collection[Sequence[Stretch]]) -> _Whole:
+def _combined(trials: Collection[Sequence[Interval]]) -> _Whole:
     each = [one for trial in trials for one in trial]
     mass = np.array([one.mass_kg for one in each])
     common = np.array([one.common for one in each])
@@ -165,7 +165,7 @@ def _combined(trials: Collection[Sequence[Stretch]]) -> _Whole:
     return _Whole(best, float(np.sqrt(widened / solved.sum())), p, np.sqrt(np.diag(covariance)))
 
 
-def _disagree(trials: Collection[Sequence[Stretch]]) -> bool:
+def _disagree(trials: Collection[Sequence[Interval]]) -> bool:
     """Whether the trials, each as a whole, differ by more than their errors."""
     mass, sd = np.array([_combined([trial])[:2] for trial in trials]).T
     weight = 1.0 / (sd**2 + GAIN_SD**2)
@@ -175,28 +175,30 @@ def _disagree(trials: Collection[Sequence[Stretch]]) -> bool:
 
 
 def _judged(
-    kept: Collection[Sequence[Stretch]], most_percent: float, height_m: float | None
-) -> ToldMass:
+    kept: Collection[Sequence[Interval]], most_percent: float, height_m: float | None
+) -> MeasuredMass:
     whole = _combined(kept)
     seconds = sum(one.seconds for trial in kept for one in trial)
     count = sum(len(trial) for trial in kept)
-    told = ToldMass(whole.mass, float(np.hypot(whole.sd, GAIN_SD)), seconds, count)
-    if not told.half_width_percent <= most_percent:
+    measured = MeasuredMass(whole.mass, float(np.hypot(whole.sd, GAIN_SD)), seconds, count)
+    if not measured.half_width_percent <= most_percent:
         return unknown(
-            f"the plates tell {told.mass_kg:.1f} kg to {told.half_width_percent:.0f} % only, in "
-            f"{seconds:.1f} s with all contacts on them"
+            f"the plates measure {measured.mass_kg:.1f} kg to {measured.half_width_percent:.0f} % "
+            f"only, in {seconds:.1f} s with all contacts on them"
         )
     low, high = (LEAST_KG, MOST_KG) if height_m is None else np.array(BMI_KG_M2) * height_m**2
-    if not low <= told.mass_kg <= high:
+    if not low <= measured.mass_kg <= high:
         stature = "" if height_m is None else f" of {height_m:.2f} m"
-        reason = f"the plates tell {told.mass_kg:.1f} kg, a person{stature} has {low:.0f} to "
-        reason += f"{high:.0f}{_likely_unit(told.mass_kg, height_m)}"
+        reason = (
+            f"the plates measure {measured.mass_kg:.1f} kg, a person{stature} has {low:.0f} to "
+        )
+        reason += f"{high:.0f}{_likely_unit(measured.mass_kg, height_m)}"
         return replace(unknown(reason), of_nobody=True)
-    return told
+    return measured
 
 
 def _likely_unit(mass_kg: float, height_m: float | None) -> str:
-    """Of forces that were read in newton and so tell a mass that nobody of this stature has."""
+    """Of forces that were read in newton and so make a mass that nobody of this stature has."""
     if height_m is None:
         return ""
     low, high = np.array(USUAL_BMI_KG_M2) * height_m**2
@@ -204,27 +206,27 @@ def _likely_unit(mass_kg: float, height_m: float | None) -> str:
     return f"; {_IN_UNIT.format(units[0])}" if len(units) == 1 else ""
 
 
-def plates_apart(
-    plates: Mapping[str, Sequence[Stretch]], person_kg: float | None, apart_percent: float
+def differing_plates(
+    plates: Mapping[str, Sequence[Interval]], person_kg: float | None, apart_percent: float
 ) -> list[Finding]:
-    """A warning for each plate that, while it bears the person alone, tells another mass than
+    """A warning for each plate that, while it bears the person alone, shows another mass than
     another plate does, and than ``person_kg`` if that is stated.
 
-    plates : stretches by the plate that bears all. apart_percent : what may differ beside the
+    plates : intervals by the plate that bears all. apart_percent : what may differ beside the
     intervals.
     """
-    told = {name: told_mass({name: some}, _PERCENT) for name, some in plates.items()}
-    told = {name: one for name, one in told.items() if one.is_known}
+    measured = {name: measured_mass({name: some}, _PERCENT) for name, some in plates.items()}
+    measured = {name: one for name, one in measured.items() if one.is_known}
     findings = []
-    for name, one in told.items():
-        others = {k: two for k, two in told.items() if _are_apart(one, two, apart_percent)}
+    for name, one in measured.items():
+        others = {k: two for k, two in measured.items() if _are_apart(one, two, apart_percent)}
         known = person_kg is not None and not _are_apart(
             one, replace(one, mass_kg=person_kg, sd=0.0), apart_percent
         )
         if not others or known:
             continue
         beside = " and ".join(f"{two.mass_kg:.1f} kg on plate {k}" for k, two in others.items())
-        found = f"its vertical force tells {one.mass_kg:.1f} kg while it bears the person alone, "
+        found = f"its vertical force shows {one.mass_kg:.1f} kg while it bears the person alone, "
         found += f"and {beside}"
         expected = "one weight on every plate"
         expected += "" if person_kg is None else f", the stated {person_kg:.1f} kg"
@@ -235,7 +237,7 @@ def plates_apart(
     return findings
 
 
-def _are_apart(one: ToldMass, other: ToldMass, percent: float) -> bool:
+def _are_apart(one: MeasuredMass, other: MeasuredMass, percent: float) -> bool:
     ratio = one.mass_kg / other.mass_kg
     apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
     return apart > percent + one.half_width_percent + other.half_width_percent
@@ -246,18 +248,18 @@ def _are_apart(one: ToldMass, other: ToldMass, percent: float) -> bool:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The stated mass, and known loads with it, beside what the plates tell of both."""
+    """The stated mass, and known loads with it, against what the plates measure of both."""
 
     stated_kg: float
     load_kg: float
-    told: ToldMass
+    measured: MeasuredMass
     tolerance_percent: float
     gross_percent: float
     height_m: float | None
 
     @property
     def difference_percent(self) -> float:
-        return _PERCENT * (self.told.mass_kg / self.total_kg - 1.0)
+        return _PERCENT * (self.measured.mass_kg / self.total_kg - 1.0)
 
     @property
     def total_kg(self) -> float:
@@ -266,18 +268,21 @@ class Comparison:
     @property
     def is_small(self) -> bool:
         """Within tolerance and interval; nothing is to be said."""
-        return abs(self.difference_percent) <= self.tolerance_percent + self.told.half_width_percent
+        return (
+            abs(self.difference_percent)
+            <= self.tolerance_percent + self.measured.half_width_percent
+        )
 
     @property
     def is_gross(self) -> bool:
         """More than clothes, shoes and months make."""
-        ratio = self.told.mass_kg / self.total_kg
+        ratio = self.measured.mass_kg / self.total_kg
         apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
-        return apart > self.gross_percent + self.told.half_width_percent
+        return apart > self.gross_percent + self.measured.half_width_percent
 
     def likely(self) -> str:
         """What the stated number is likely to be; empty if it is none of the known mistakes."""
-        for name, factor in _UNITS if self.told.mass_kg >= LEAST_KG else ():
+        for name, factor in _UNITS if self.measured.mass_kg >= LEAST_KG else ():
             if self._meets(self.stated_kg / factor):
                 return f"{self.stated_kg:g} is likely to be in {name}"
         height = self.height_m
@@ -296,8 +301,8 @@ class Comparison:
         return ""
 
     def _meets(self, mass_kg: float) -> bool:
-        allowed = self.tolerance_percent + self.told.half_width_percent
-        return abs(_PERCENT * ((mass_kg + self.load_kg) / self.told.mass_kg - 1.0)) <= allowed
+        allowed = self.tolerance_percent + self.measured.half_width_percent
+        return abs(_PERCENT * ((mass_kg + self.load_kg) / self.measured.mass_kg - 1.0)) <= allowed
 
     def sentence(self, where: str) -> str:
         """Of a difference: both numbers; what is likely, where it is gross."""
@@ -308,25 +313,25 @@ class Comparison:
             remark = f"; {likely}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
-            f"the plates tell {self.told.words()}{remark}"
+            f"the plates measure {self.measured.words()}{remark}"
         )
 
 
-def mass_finding(told: ToldMass, comparison: Comparison | None, where: str) -> Finding:
+def mass_finding(measured: MeasuredMass, comparison: Comparison | None, where: str) -> Finding:
     """The line for the quality table of a trial."""
-    if told.of_nobody:
-        return Finding("mass", "", told.reason, "a person", "left it open", "warning")
-    if not told.is_known:
-        expected, action = "a mass that the plates tell for sure", "nothing compared"
-        return Finding("plate_mass", "", f"not known: {told.reason}", expected, action, "info")
+    if measured.of_nobody:
+        return Finding("mass", "", measured.reason, "a person", "left it open", "warning")
+    if not measured.is_known:
+        expected, action = "a mass that the plates surely show", "nothing compared"
+        return Finding("plate_mass", "", f"not known: {measured.reason}", expected, action, "info")
     if comparison is None:
-        return Finding("plate_mass", "", told.words(), "no mass is stated", "", "info")
+        return Finding("plate_mass", "", measured.words(), "no mass is stated", "", "info")
     if comparison.is_gross:
         action = "contacts found with the plates' mass"
         return Finding("mass", "", comparison.sentence(where), "", action, "warning")
     expected = f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
     if comparison.is_small:
-        found, level = told.words(), "info"
+        found, level = measured.words(), "info"
     else:
         found, level = comparison.sentence(where), "warning"
     return Finding("plate_mass", "", found, expected, "left both as they are", level)

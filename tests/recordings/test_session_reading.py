@@ -16,7 +16,7 @@ from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
-from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
+from bsip_cli.recordings.session_reading import SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
@@ -166,7 +166,7 @@ def test_the_forces_of_the_person_come_back(name):
     make, faults, words = FAULTS[name]
     _, force, point = motion()
     trial = opened(make(**faults))
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     found = findings_about(session)
     assert all(words in f.action and f.level == "corrected" for f in found)
     assert len(found) == (2 if words else 0)
@@ -180,7 +180,7 @@ def test_the_forces_of_the_person_come_back(name):
 def test_exchanged_plates():
     one, two = of_c3d()
     trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     assert [v.reading.place_of for v in session.plates.values()] == ["2", "1"]
     sound = assemble(opened([one, two]), session_of())
     np.testing.assert_allclose(_total(assemble(trial, session)), _total(sound), atol=1e-9)
@@ -191,7 +191,7 @@ def _total(recording) -> np.ndarray:
 
 
 def session_of():
-    return settle_session([TrialSamples.of(opened(of_c3d()))])
+    return session_reading([TrialSamples.of(opened(of_c3d()))])
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])
@@ -199,7 +199,7 @@ def test_copies_and_sums_count_once(make):
     one, two = make()
     sum_ = replace(one, **_renamed(one, "3", _force(one) + _force(two)))
     copy = replace(two, **_renamed(two, "4", _force(two)))
-    session = settle_session([TrialSamples.of(opened([one, two, sum_, copy]))])
+    session = session_reading([TrialSamples.of(opened([one, two, sum_, copy]))])
     assert {n: v.repeats for n, v in session.plates.items() if v.repeats} == {
         "3": ("1", "2"),
         "4": ("2",),
@@ -222,7 +222,7 @@ def test_forces_that_no_reading_brings_under_the_feet_are_refused():
     far = motion()[0] + np.array([3.0, -2.0, 0.0])
     for make in (of_c3d, of_table):
         trial = opened(make(), far)
-        session = settle_session([TrialSamples.of(trial)])
+        session = session_reading([TrialSamples.of(trial)])
         assert [f.level for f in findings_about(session)] == ["excluded"] * 2
         assert assemble(trial, session).plates == ()
 
@@ -232,7 +232,7 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
     mirrored = opened(of_table()).in_frame(FrameChange("all", axis))
     markers = mirrored.recording.markers_m
     mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
-    session = settle_session([TrialSamples.of(mirrored)])
+    session = session_reading([TrialSamples.of(mirrored)])
     assert session.frame.moved == "all"
     there = assemble(mirrored, session)
     assert handedness(there.labels, there.markers_m).parts["pelvis"] > 0.9
@@ -242,14 +242,14 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
 
 def test_mirrored_markers_alone_leave_the_forces():
     trial = opened(of_table()).in_frame(FrameChange("markers", 1))
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     assert session.frame == FrameChange("markers", 1)
     np.testing.assert_allclose(assemble(trial, session).markers_m, motion()[0])
 
 
 def test_mirrored_forces_alone_leave_the_markers():
     trial = opened(of_table()).in_frame(FrameChange("forces", 0))
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     assert session.frame == FrameChange("forces", 0)
     np.testing.assert_allclose(
         _wrench(assemble(trial, session)), _wrench(assemble(opened(of_table()), session_of()))
@@ -259,7 +259,7 @@ def test_mirrored_forces_alone_leave_the_markers():
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_forces_in_turned_axes_are_turned_back(turns):
     trial = opened(of_table()).in_frame(FrameChange("forces", turned_deg=90.0 * turns))
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     assert session.frame == FrameChange("forces", turned_deg=360 - 90.0 * turns)
     np.testing.assert_allclose(
         _wrench(assemble(trial, session)),
@@ -281,9 +281,9 @@ def _slow_stance() -> list[ForceOnPoint]:
 def test_side_forces_that_point_away_from_the_body_are_not_believed():
     """The sum shows nothing of it; alone the lean under each foot does."""
     sound = opened(_slow_stance())
-    assert findings_about(settle_session([TrialSamples.of(sound)])) == []
+    assert findings_about(session_reading([TrialSamples.of(sound)])) == []
     away = [replace(s, force_N=s.force_N * [1.0, -1.0, 1.0]) for s in _slow_stance()]
-    found = findings_about(settle_session([TrialSamples.of(opened(away))] * 2))
+    found = findings_about(session_reading([TrialSamples.of(opened(away))] * 2))
     assert [(f.level, "reversed Fy" in f.action) for f in found] == [("excluded", True)] * 2
 
 
@@ -328,7 +328,7 @@ def test_left_and_right_of_one_part_are_said():
     markers = motion()[0]
     order = [1, 0, 3, 2, *range(4, len(LABELS))]
     trial = opened(of_table(), markers[:, order])
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     assert session.frame == FrameChange()
     (said,) = [f for f in assemble(trial, session).findings if f.check == "labels"]
     assert said.subject == "pelvis" and said.level == "warning"
@@ -370,7 +370,7 @@ def test_feet_on_the_plate_count_before_all_others():
 def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
     one, two = of_c3d()
     trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
-    session = settle_session([TrialSamples.of(trial)])
+    session = session_reading([TrialSamples.of(trial)])
     alone = assemble(opened([one]), session)
     assert alone.plates == ()
     assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]

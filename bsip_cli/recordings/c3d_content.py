@@ -36,11 +36,11 @@ from bsip_cli.recordings.c3d_format import (
 from bsip_cli.recordings.c3d_layout import (
     Layout,
     about_scales,
-    says_unsigned,
-    scaling_of,
     decided_layout,
     decided_rate,
     decided_scale,
+    says_unsigned,
+    scaling_of,
 )
 from bsip_cli.recordings.c3d_mend import mended, needs_mending, pieces
 from bsip_cli.recordings.model import Finding, refusal

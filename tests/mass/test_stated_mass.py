@@ -33,7 +33,7 @@ def compared(stated_kg: float, plates_kg: float, load_kg: float = 0.0, height_m=
 )
 def test_the_likely_mistake_is_named(stated_kg, plates_kg, likely):
     comparison = compared(stated_kg, plates_kg)
-    finding = mass_finding(comparison.told, comparison, "participants.tsv")
+    finding = mass_finding(comparison.measured, comparison, "participants.tsv")
     assert comparison.is_gross and finding.level == "warning"
     assert likely in finding.found
     assert f"{stated_kg:g} kg" in finding.found and f"{plates_kg:.2f} kg" in finding.found
@@ -52,7 +52,7 @@ def test_what_is_no_known_mistake_is_said_without_a_guess(stated_kg, plates_kg):
 def test_a_small_difference_stays_what_it_was(stated_kg, level):
     comparison = compared(stated_kg, 70.0)
     assert not comparison.is_gross
-    finding = mass_finding(comparison.told, comparison, "participants.tsv")
+    finding = mass_finding(comparison.measured, comparison, "participants.tsv")
     assert finding.level == level and finding.check == "plate_mass"
 
 

@@ -20,16 +20,16 @@ def test_trials_that_agree_are_one():
 
 
 @pytest.mark.parametrize("other_kg", [40.0, 57.0, 70.0])
-def test_trials_that_disagree_tell_nothing_but_for_a_static_one(other_kg):
+def test_trials_that_disagree_show_nothing_but_for_a_static_one(other_kg):
     trials = {"static": told(62.0), "walk": told(other_kg)}
     found = measured_mass(trials, 10.0)
-    assert not found.is_known and "trials tell from" in found.reason
+    assert not found.is_known and "trials show from" in found.reason
     found = measured_mass(trials, 10.0, static={"static"})
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
     assert "the static trial counts" in found.words()
 
 
-def test_a_trial_that_tells_nothing_does_not_spoil_the_others():
+def test_a_trial_that_shows_nothing_does_not_spoil_the_others():
     found = measured_mass({"sitting": told(62.0, ahead_m=0.8), "standing": told(62.0)}, 10.0)
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
 
@@ -71,10 +71,10 @@ def test_a_mass_that_is_nobodys_is_said_with_the_likely_unit(mass_kg, unit):
         ((62.0, 74.0, 62.0), 62.0, ["2"]),
     ],
 )
-def test_a_plate_that_tells_another_mass_than_the_others_is_named(masses_kg, stated_kg, odd):
+def test_a_plate_that_shows_another_mass_than_the_others_is_named(masses_kg, stated_kg, odd):
     plates = {str(k + 1): told(kg) for k, kg in enumerate(masses_kg)}
     findings = differing_plates(plates, stated_kg, 15.0)
     assert [one.subject for one in findings] == odd
     for one in findings:
         mass_kg = masses_kg[int(one.subject) - 1]
-        assert one.level == "warning" and f"tells {mass_kg:.1f} kg" in one.found
+        assert one.level == "warning" and f"shows {mass_kg:.1f} kg" in one.found

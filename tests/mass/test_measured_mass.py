@@ -8,10 +8,10 @@ from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, me
 from tests.mass.body import told
 
 
-def test_more_stretches_tell_more():
+def test_more_intervals_show_more():
     one, many = (measured_mass({"a": told(62.0, s, 0.08)}, 10.0) for s in (0.8, 12.0))
     assert many.half_width_percent < one.half_width_percent
-    assert many.stretches == 6 and many.seconds == pytest.approx(11.8, abs=0.1)
+    assert many.intervals == 6 and many.seconds == pytest.approx(11.8, abs=0.1)
 
 
 def test_trials_that_agree_are_one():

@@ -109,7 +109,7 @@ def test_forces_of_absurd_steps_are_left_out(tmp_path):
     recording = _with_mot(tmp_path, np.arange(20) * 1e-9)
     assert recording.plates == () and "do not increase evenly" in recording.forces_note
     recording = _with_mot(tmp_path, np.arange(20) * 1.1e-5)
-    assert recording.plates == () and "would be needed beside" in recording.forces_note
+    assert recording.plates == () and "would be needed for" in recording.forces_note
 
 
 def test_more_forces_than_plates_in_any_laboratory(tmp_path):

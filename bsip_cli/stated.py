@@ -146,6 +146,12 @@ def _sum(parts: list[tuple[float, str]], quantity: Quantity) -> float | None:
     return sum(n * quantity.units[u] for (n, _), u in zip(parts, units, strict=True))
 
 
+def percent_apart(one: float, other: float) -> float:
+    """By how much the larger of two sizes is larger; infinite where one is nothing."""
+    ratio = one / other if one > 0 else float("inf")
+    return 100.0 * (max(ratio, 1.0 / ratio) - 1.0)
+
+
 def is_usual_pair(mass_kg: float, height_m: float) -> bool:
     """Whether a unit may be recognised by this body-mass index."""
     return USUAL_BMI_KG_M2[0] <= mass_kg / height_m**2 <= USUAL_BMI_KG_M2[1]

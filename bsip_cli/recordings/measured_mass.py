@@ -13,7 +13,8 @@ from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Interval
-from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
+from bsip_cli.recordings.written import FORCE_UNITS_N
+from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2, percent_apart
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
 # (makers' data sheets), 0.27 % between equator and poles for gravity.
@@ -33,8 +34,6 @@ _UNITS = (
     ("kilograms that were divided by 2.2046 once too often", 1 / 2.20462),
     ("kilograms that were divided by 9.81", 1 / 9.80665),
 )
-# What forces were written in, that were read in newton: newton over the unit.
-_FORCE_UNITS = (("pounds-force", 4.44822), ("kilogram-force", 9.80665))
 _IN_UNIT = "the forces are likely to be in another unit, {}: export them in N"
 _CM_PER_M = 100.0
 _NEAR_CM = 3.0
@@ -202,7 +201,7 @@ def _likely_unit(mass_kg: float, height_m: float | None) -> str:
     if height_m is None:
         return ""
     low, high = np.array(USUAL_BMI_KG_M2) * height_m**2
-    units = [name for name, newton in _FORCE_UNITS if low <= newton * mass_kg <= high]
+    units = [name for name, newton in FORCE_UNITS_N.items() if low <= newton * mass_kg <= high]
     return f"; {_IN_UNIT.format(units[0])}" if len(units) == 1 else ""
 
 
@@ -238,8 +237,7 @@ def differing_plates(
 
 
 def _are_apart(one: MeasuredMass, other: MeasuredMass, percent: float) -> bool:
-    ratio = one.mass_kg / other.mass_kg
-    apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
+    apart = percent_apart(one.mass_kg, other.mass_kg)
     return apart > percent + one.half_width_percent + other.half_width_percent
 
 
@@ -276,8 +274,7 @@ class Comparison:
     @property
     def is_gross(self) -> bool:
         """More than clothes, shoes and months make."""
-        ratio = self.measured.mass_kg / self.total_kg
-        apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
+        apart = percent_apart(self.measured.mass_kg, self.total_kg)
         return apart > self.gross_percent + self.measured.half_width_percent
 
     def likely(self) -> str:
@@ -295,7 +292,7 @@ class Comparison:
         return ""
 
     def _likely_forces(self) -> str:
-        for name, newton in _FORCE_UNITS:
+        for name, newton in FORCE_UNITS_N.items():
             if self._meets(self.stated_kg / newton):
                 return _IN_UNIT.format(name)
         return ""

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2
+from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2, percent_apart
 
 FORCE_UNITS_N = {"kN": 1000.0, "kilogram-force": 9.80665, "pounds-force": 4.44822}
 _HALF = 0.5  # of the weight: a person of whom one foot stands off the plates
-_PERCENT = 100.0
 _STEPS = 2.0  # of the coarser clock: lengths that differ by less are the same
 OTHER_RATE = -4.6
 """Logarithm: one session of a hundred states another rate than that of its cameras."""
@@ -96,7 +95,7 @@ def force_unit(
         found = [
             name
             for name, mass in masses.items()
-            if name and _apart_percent(mass, stated_kg) <= gross_percent
+            if name and percent_apart(mass, stated_kg) <= gross_percent
         ]
     else:
         found = [name for name, mass in masses.items() if usual[0] <= mass <= usual[1]]
@@ -105,9 +104,4 @@ def force_unit(
 
 def is_over_weight(mass_kg: float, gross_percent: float) -> bool:
     """Whether forces are parts of the weight."""
-    return _apart_percent(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent
-
-
-def _apart_percent(one: float, other: float) -> float:
-    ratio = one / other if one > 0 else np.inf
-    return _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
+    return percent_apart(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent

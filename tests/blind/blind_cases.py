@@ -114,6 +114,14 @@ OUTSIDE: dict[str, Range] = {
     "outside_late_channel": Range(0.01, 0.04, ("fx", "fy", "fz"), (SESSION, "squat")),
     "outside_loose_connector": Range(0.01, 0.04, ("-",), (SESSION, "squat")),
     "outside_clock_jump": Range(0.02, 0.1, ("-",), (SESSION, "squat"), True),
+    "outside_plate_creep": Range(0.03, 0.1, ("-",), (SESSION, "squat")),
+    "outside_plate_ringing": Range(0.2, 0.6, ("-",), (SESSION, "hops")),
+    "outside_slow_forces": Range(2.0, 4.0, ("-",), (SESSION, "hops")),
+    "outside_uneven_plate": Range(0.2, 0.8, ("-",), (SESSION, "squat"), True),
+    "outside_held_samples": Range(0.1, 0.3, ("-",), (SESSION, "squat")),
+    "outside_coarse_steps": Range(20.0, 60.0, ("-",), (SESSION, "squat")),
+    "outside_water": Range(40.0, 150.0, ("-",), (SESSION, "squat")),
+    "outside_camera_bump": Range(0.009, 0.035, ("-",), (SESSION, "squat"), True),
 }
 # Two of these at once can be told apart in any trial that holds both.
 DOUBLES: tuple[tuple[str, str], ...] = (
@@ -200,14 +208,19 @@ def on_one_plate(session: Session, rng: np.random.Generator) -> Session:
 
 
 def long_suite(
-    each: int, null_count: int, others: int, seed: int, effects: Sequence[str] = tuple(CATALOGUE)
+    each: int,
+    null_count: int,
+    pairs: int,
+    outside: int,
+    seed: int,
+    effects: Sequence[str] = tuple(CATALOGUE),
 ) -> list[Session]:
-    """All of it: effects, nulls, doubles and what the catalogue lacks."""
+    """All of it: effects, nulls, pairs, and each kind that the catalogue lacks ``outside`` times."""
     cases = [
         *draws({name: CATALOGUE[name] for name in effects}, each, seed, "single"),
         *nulls(null_count),
-        *doubles(others, seed),
-        *draws(OUTSIDE, -(-others // len(OUTSIDE)), seed, "outside"),
+        *doubles(pairs, seed),
+        *draws(OUTSIDE, outside, seed, "outside"),
     ]
     return sessions_of(cases, seed, sequence_s=60.0)
 

@@ -26,7 +26,7 @@ BATCH = 8  # people of one study; an interruption loses at most their work
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parsed(arguments)
-    asked = ("draws", "nulls", "others", "seed", "effects")
+    asked = ("draws", "nulls", "pairs", "outside", "seed", "effects")
     settings = {name: getattr(options, name) for name in asked}
     sessions = long_suite(*settings.values())
     keep_settings(options.results, settings)
@@ -43,7 +43,8 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--tables", type=Path, default=TABLES, help="folder that gets them")
     add("--draws", type=int, default=10, help="cases per effect of the catalogue")
     add("--nulls", type=int, default=40, help="people with nothing hidden")
-    add("--others", type=int, default=20, help="cases of two effects, and outside the catalogue")
+    add("--pairs", type=int, default=20, help="cases of two effects")
+    add("--outside", type=int, default=2, help="cases of each kind outside the catalogue")
     add("--seed", type=int, default=2027, help="draws effects, sizes, places and people")
     add("--effects", nargs="+", choices=CATALOGUE, default=list(CATALOGUE), help="only these")
     add("--jobs", type=int, default=2, help="processes at once")

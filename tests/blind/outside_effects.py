@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from bsip_cli.cli import main
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects import EFFECTS
 from bsip_cli.simulate.effects.base import KINDS, TABLE, Effect, Target
 from bsip_cli.simulate.effects.plates import ChannelFault, OfEveryPlate
+from bsip_cli.simulate.numerics import from_rotation_vector
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Load, Plan, Poses
 
@@ -32,6 +34,9 @@ WANDERS_S = 1.5
 SLACK_M = 0.1
 FASTENED_M = (-1.2, 0.1, 0.3)  # a tether's far end from the first place of the pelvis
 BURST_FRAMES = (4, 12)
+BURST_S = (0.02, 0.1)
+CREEPS_S = 3.0
+RINGS_HZ, RINGS_DAMPED = (7.0, 12.0), 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +174,122 @@ class ClockJump(Effect, name="outside_clock_jump"):
         return instruments.with_forces_from(
             times - self.size * (times > self.from_share * times[-1])
         )
+
+
+class PlateCreep(OfEveryPlate, name="outside_plate_creep"):
+    """The part `size` of every channel follows with a time constant of 3 s: a soft mount."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        follows = 1.0 - np.exp(-(times_s[1] - times_s[0]) / CREEPS_S)
+        known = np.nan_to_num(reading)
+        start = (1.0 - follows) * known[:1]
+        slow, _ = lfilter([follows], [1.0, follows - 1.0], known, axis=0, zi=start)
+        reading += self.size * (slow - reading)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateRinging(OfEveryPlate, name="outside_plate_ringing"):
+    """The part `size` of every channel goes through a resonance: a plate on a floor that swings."""
+
+    frequency_hz: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, float(rng.uniform(*RINGS_HZ)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        pace = 2.0 * np.pi * self.frequency_hz
+        rate = 1.0 / (times_s[1] - times_s[0])
+        over, under = bilinear([pace**2], [1.0, 2.0 * RINGS_DAMPED * pace, pace**2], rate)
+        from_start = np.nan_to_num(reading) - np.nan_to_num(reading[:1])
+        reading += self.size * (lfilter(over, under, from_start, axis=0) + reading[:1] - reading)
+
+
+class SlowForces(OfEveryPlate, name="outside_slow_forces"):
+    """All channels were smoothed too much, by a filter without delay that cuts off at `size` Hz."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        rate = 1.0 / (times_s[1] - times_s[0])
+        cut = butter(2, self.size, fs=rate, output="sos")
+        reading[:] = sosfiltfilt(cut, np.nan_to_num(reading), axis=0)
+
+
+class UnevenPlate(OfEveryPlate, name="outside_uneven_plate"):
+    """The vertical channel's gain grows by `size` per metre that the load lies along the plate."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, 2] -= self.size * reading[:, 4]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldSamples(OfEveryPlate, name="outside_held_samples"):
+    """The converter stalls: all channels hold their value for moments; `size` is their part."""
+
+    seed: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        count, rate = len(times_s), 1.0 / (times_s[1] - times_s[0])
+        rng = np.random.default_rng([self.seed, count])
+        source = np.arange(count)
+        while np.mean(source != np.arange(count)) < self.size:
+            length = int(rate * rng.uniform(*BURST_S))
+            first = int(rng.integers(1, count - length))
+            source[first : first + length] = source[first - 1]
+        reading[:] = reading[source]
+
+
+class CoarseSteps(OfEveryPlate, name="outside_coarse_steps"):
+    """Forces come in steps of `size` N, moments in steps of a tenth of that in N m."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        step = self.size * np.repeat([1.0, 0.1], 3)
+        reading[:] = step * np.round(reading / step)
+
+
+class Water(Effect, name="outside_water"):
+    """Something brakes the pelvis by `size` N at 1 m/s, with the square of its velocity."""
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        return plan.with_load(Brake(self.size))
+
+
+@dataclass(frozen=True, eq=False)
+class Brake(Load):
+    """A force on the pelvis against its velocity."""
+
+    drag_n_s2_m2: float
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """What the body exerts on what brakes it."""
+        r = poses.origin_m["lower_torso"]
+        velocity = np.gradient(r, step_s, axis=0)
+        force = self.drag_n_s2_m2 * np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
+        return force, np.cross(r, force)
+
+
+@dataclass(frozen=True, eq=False)
+class CameraBump(Effect, name="outside_camera_bump"):
+    """From a moment on all markers are turned by `size` about a level axis through the lab's
+    origin: somebody ran into a camera."""
+
+    heading_rad: float
+    from_share: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, float(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.35, 0.65)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        axis = np.array([np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0])
+        turn = from_rotation_vector(self.size * axis)
+        points = instruments.points_m.copy()
+        first = int(self.from_share * len(points))
+        points[first:] = points[first:] @ turn.T
+        return replace(instruments, points_m=points)
 
 
 EFFECTS.update({name: KINDS[name] for name in OUTSIDE})

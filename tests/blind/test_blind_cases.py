@@ -29,12 +29,12 @@ def cases_of(sessions: list[Session]) -> list[Case]:
 
 
 def test_the_long_suite_holds_enough_of_everything():
-    sessions = long_suite(10, 40, 20, 5)
+    sessions = long_suite(10, 40, 20, 2, 5)
     cases = cases_of(sessions)
     effects = Counter(case.hidden[0].effect for case in cases if case.kind == "single")
     assert effects == dict.fromkeys(EFFECTS, 10)
     kinds = Counter(case.kind for case in cases)
-    assert kinds == {"single": 250, "null": 40, "double": 20, "outside": 24}  # three of each
+    assert kinds == {"single": 250, "null": 40, "double": 20, "outside": 32}  # two of each
     assert {c.hidden[0].effect for c in cases if c.kind == "outside"} == set(OUTSIDE)
     assert all(len(case.hidden) == 2 for case in cases if case.kind == "double")
     assert len({case.name for case in cases}) == len(cases)
@@ -50,7 +50,7 @@ def test_the_short_suite_holds_one_of_everything():
 
 
 def test_sizes_fill_their_range_and_both_signs():
-    cases = [c for c in cases_of(long_suite(10, 0, 0, 5)) if c.kind == "single"]
+    cases = [c for c in cases_of(long_suite(10, 0, 0, 0, 5)) if c.kind == "single"]
     for effect, allowed in CATALOGUE.items():
         sizes = np.array([c.hidden[0].size for c in cases if c.hidden[0].effect == effect])
         assert (len(set(np.sign(sizes))) == 2) == allowed.signed, effect
@@ -59,14 +59,14 @@ def test_sizes_fill_their_range_and_both_signs():
 
 
 def test_a_session_holds_one_case_or_several_trials():
-    for session in long_suite(10, 40, 20, 5):
+    for session in long_suite(10, 40, 20, 2, 5):
         places = {case.place for case in session.cases}
         assert SESSION not in places or len(session.cases) == 1
-    assert long_suite(3, 2, 2, 5) == long_suite(3, 2, 2, 5) != long_suite(3, 2, 2, 6)
+    assert long_suite(3, 2, 2, 1, 5) == long_suite(3, 2, 2, 1, 5) != long_suite(3, 2, 2, 1, 6)
 
 
 def test_half_of_the_labs_have_a_plate_per_foot():
-    sessions = long_suite(10, 40, 20, 5)
+    sessions = long_suite(10, 40, 20, 2, 5)
     apart = [session for session in sessions if session.plate_per_foot]
     assert len(apart) == len(sessions) // 2
     faults = [
@@ -140,7 +140,7 @@ def quiet(case: Case) -> Score:
 def test_an_interrupted_suite_goes_on_and_writes_its_tables(tmp_path, monkeypatch):
     tables, results = tmp_path / "tables", tmp_path / "results"
     arguments = ["--results", str(results), "--tables", str(tables), "--draws", "1"]
-    arguments += ["--nulls", "4", "--others", "2"]
+    arguments += ["--nulls", "4", "--pairs", "2", "--outside", "1"]
     monkeypatch.setattr(blind_long, "run_batch", FakeBatches(1))
     with pytest.raises(KeyboardInterrupt):
         blind_long.main(arguments)
@@ -149,11 +149,11 @@ def test_an_interrupted_suite_goes_on_and_writes_its_tables(tmp_path, monkeypatc
     rest = FakeBatches(100)
     monkeypatch.setattr(blind_long, "run_batch", rest)
     blind_long.main(arguments)
-    sessions = long_suite(1, 4, 2, 2027)
+    sessions = long_suite(1, 4, 2, 1, 2027)
     assert sum(rest.sessions) == len(sessions) - blind_long.BATCH
     after = {path: path.stat().st_mtime_ns for path in results.rglob("*.json")}
     assert kept.items() <= after.items()
     assert len(after) == 1 + len(cases_of(sessions))  # and the settings
-    assert "\na whole session,39,0," in (tables / "blind_false_positives.csv").read_text()
+    assert "\na whole session,47,0," in (tables / "blind_false_positives.csv").read_text()
     with pytest.raises(SystemExit, match="another --results"):
         blind_long.main([*arguments[:-1], "3"])

@@ -96,7 +96,8 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     if maybe and not surely:
         expected, action = "accelerations as large as forces make them", "took the stated rate"
         findings.append(Finding("rate", "cameras", f"perhaps {maybe}", expected, action, "warning"))
-    if note := recording.forces_note or surely:
+    foreign = _other_trial(session.of_others.get(recording.path.stem, ""))
+    if note := recording.forces_note or foreign or surely:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []
@@ -224,6 +225,16 @@ def _other_pace(times: float, rate_hz: float) -> str:
         f"and accelerations agree at about {times * rate_hz:.3g} Hz; correct the rate of the "
         "cameras in the file"
     )
+
+
+def _other_trial(name: str) -> str:
+    """Empty if there is none."""
+    words = (
+        "its forces do not last as long as its markers, and those of other trials of the session "
+        f"neither, but as long as each other's: here as the markers of {name}; give each force "
+        "table the name of its own trial"
+    )
+    return words if name else ""
 
 
 def _about_delay(delay_s: float) -> list[Finding]:

@@ -31,6 +31,7 @@ from bsip_cli.recordings.written import (
     Written,
     force_unit,
     likely_paces,
+    of_other_trials,
 )
 
 _SURELY_NOBODY = 0.999  # probability from which on no reading is believed
@@ -75,7 +76,8 @@ class SessionReading:
 
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
-    stated rate is not believed. ``written`` : what the files of all trials are read as.
+    stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one.
+    ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
 
@@ -84,6 +86,7 @@ class SessionReading:
     delays_s: Mapping[str, float] = field(default_factory=dict)
     paces: Mapping[str, float] = field(default_factory=dict)
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
+    of_others: Mapping[str, str] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
@@ -102,10 +105,22 @@ def reading_of_files(
     limits: GateLimits = USUAL,
 ) -> SessionReading:
     """`session_reading` of trials as their files say, or ``read`` otherwise: with forces of another
-    unit than N, or of markers or forces of another rate than the stated one.
+    unit than N, or of markers or forces of another rate than the stated one. Trials that have each
+    other's forces tell nothing.
 
     stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
     """
+    whose = of_other_trials([one.lengths for one in trials])
+    if of_others := {trials[k].name: trials[other].name for k, other in whose.items()}:
+
+        def own(written: Written = AS_WRITTEN) -> list[TrialSamples]:
+            return [
+                replace(one.without(one.sources), lengths=None) if one.name in of_others else one
+                for one in read(written)
+            ]
+
+        found = reading_of_files(own(), own, stated_kg, stated_m, gross_percent, limits)
+        return replace(found, of_others=of_others)
     written, masses = AS_WRITTEN, [one.mass_kg for one in trials if one.mass_kg]
     if masses:
         usual = Stature.of_all([one.stature for one in trials])

@@ -75,6 +75,20 @@ def likely_paces(trials: Sequence[Lengths | None]) -> dict[float, float]:
     return {pace: log for pace, log in odds.items() if log > prior}
 
 
+def of_other_trials(trials: Sequence[Lengths | None]) -> dict[int, int]:
+    """Trials, by number, whose forces are not as long as their markers, with the one whose markers
+    are: where all such trials have each other's lengths, they have each other's forces."""
+    odd = {k: one for k, one in enumerate(trials) if one is not None and not one.are_alike(1.0)}
+    markers, forces = (
+        np.array([getattr(one, name) for one in odd.values()]) for name in ("markers_s", "forces_s")
+    )
+    near_s = _STEPS * max((one.step_s for one in odd.values()), default=0.0)
+    if len(odd) < 2 or (np.abs(np.sort(markers) - np.sort(forces)) > near_s).any():
+        return {}
+    whose = [int(np.argmin(np.abs(markers - force_s))) for force_s in forces]
+    return {k: list(odd)[one] for k, one in zip(odd, whose, strict=True)}
+
+
 def force_unit(
     mass_kg: float, stated_kg: float | None, height_m: float | None, gross_percent: float
 ) -> str:

@@ -30,14 +30,14 @@ from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
-_OF_TRIALS = ("delays_s", "paces", "maybe_paces")
+_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others")
 _HALF = ("half_size_x_m", "half_size_y_m")
 
 
 def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     rows: list[dict] = []
-    facts: dict[str, dict[str, float]] = {name: {} for name in _OF_TRIALS}
+    facts: dict[str, dict[str, float | str]] = {name: {} for name in _OF_TRIALS}
     written: dict[str, dict[str, float]] = {name: {} for name in asdict(AS_WRITTEN)}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})

@@ -215,7 +215,7 @@ def long_suite(
     seed: int,
     effects: Sequence[str] = tuple(CATALOGUE),
 ) -> list[Session]:
-    """All of it: effects, nulls, pairs, and each kind that the catalogue lacks ``outside`` times."""
+    """Effects, nulls, pairs, and each kind that the catalogue lacks ``outside`` times."""
     cases = [
         *draws({name: CATALOGUE[name] for name in effects}, each, seed, "single"),
         *nulls(null_count),

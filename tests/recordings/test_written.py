@@ -10,7 +10,14 @@ import pytest
 from bsip_cli.recordings.read import findings_about, open_recording
 from bsip_cli.recordings.session_reading import reading_of_files
 from bsip_cli.recordings.trial_samples import TrialSamples
-from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written, force_unit, likely_paces
+from bsip_cli.recordings.written import (
+    AS_WRITTEN,
+    Lengths,
+    Written,
+    force_unit,
+    likely_paces,
+    of_other_trials,
+)
 
 SIZES = {"kN": 1e-3, "pounds-force": 1 / 4.44822, "kilogram-force": 1 / 9.80665}
 TRIALS = ("walking1", "squats1", "static1")
@@ -45,6 +52,20 @@ def test_a_unit_that_is_not_sure_is_not_taken(mass_kg, stated_kg, height_m):
 def test_lengths_that_differ_by_one_factor_in_several_trials_are_a_pace():
     odds = likely_paces(lengths((2.5, 2.0), (5.0, 4.0), (7.51, 6.0)))
     assert max(odds, key=odds.__getitem__) == 1.25 and odds[1.25] > 5
+
+
+@pytest.mark.parametrize(
+    ("pairs", "whose"),
+    [
+        (((2.0, 3.0), (3.0, 2.0)), {0: 1, 1: 0}),
+        (((2.0, 3.0), (3.0, 4.5), (4.5, 2.0)), {0: 1, 1: 2, 2: 0}),  # in a ring
+        (((2.0, 4.0), (5.0, 5.0), (4.0, 2.0)), {0: 2, 2: 0}),
+        (((2.0, 3.0), (3.0, 4.5)), {}),  # a rate
+        (((2.0, 3.0), (3.0, 2.0), (6.0, 5.0)), {}),  # cut anyhow
+    ],
+)
+def test_trials_that_have_each_others_forces(pairs, whose):
+    assert of_other_trials(lengths(*pairs)) == whose
 
 
 def test_one_length_is_a_hint_however_often_it_comes():

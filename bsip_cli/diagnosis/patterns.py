@@ -9,7 +9,6 @@ with named ones; what an error goes along with is said.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -51,23 +50,7 @@ def signal_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
     return move_moments(wrench, place_of_stance_m(scene))[:, CHANNELS.index(channel)]
 
 
-class Component(Nameless):
-    """In one component of the wrench."""
-
-    @abstractmethod
-    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        """(N,) what the component gains."""
-
-    @staticmethod
-    def channel(target: str) -> str:
-        """The component that a target is about."""
-        return target.split(" ")[0]
-
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return in_channel(scene, self.channel(target), self.signal(scene, target, values))
-
-
-class Tone(Component):
+class Tone(Nameless):
     """One component that swings at one frequency."""
 
     FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
@@ -107,9 +90,9 @@ class Tone(Component):
         lines = hertz[peaks[np.argsort(-found["peak_heights"])][: self.MOST_LINES]]
         return lines[(lines > slowest) & (lines < fastest)]
 
-    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
-        return values[0] * np.cos(phase) + values[1] * np.sin(phase)
+        return in_channel(scene, target, values[0] * np.cos(phase) + values[1] * np.sin(phase))
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
@@ -124,6 +107,7 @@ class Tone(Component):
 # What is large of each quantity: from there on its smooth function hardly changes any more.
 _LOAD, _ARM_M, _AWAY_M, _FAST_M_S, _AT_ONCE_S = 0.5, 0.1, 0.2, 0.5, 0.1
 
+_ALL = "all"  # components
 _ALONG = {
     "time": "the time in the trial",
     "load": "the load",
@@ -140,22 +124,30 @@ _ALONG = {
 }
 
 
-class Course(Component):
-    """One component that errs by a smooth function of one quantity."""
+class Course(Nameless):
+    """One component, or all, that errs by a smooth function of one quantity."""
 
-    DEGREE = 4  # of its Legendre polynomials, from the first on: a constant is a lost zero
+    DEGREE = 4  # of its Legendre polynomials
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return tuple(f"{channel} by {quantity}" for channel in CHANNELS for quantity in _ALONG)
+        return tuple(f"{which} by {what}" for which in (_ALL, *CHANNELS) for what in _ALONG)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        unit = unit_of(self.channel(target))
-        degrees = range(1, self.DEGREE + 1)
-        return tuple(Parameter(f"degree_{k}", unit, -1e3, 1e3, _LARGE[unit]) for k in degrees)
+        return tuple(
+            Parameter(f"{channel}_{degree}", unit_of(channel), -1e3, 1e3, _LARGE[unit_of(channel)])
+            for channel in self.channels(target)
+            for degree in range(self.DEGREE + 1)
+        )
 
-    def functions(self, scene: Scene, target: str) -> np.ndarray:
-        """(N, DEGREE) polynomials of a target's quantity, which lies between -1 and 1."""
-        channel, quantity = target.split(" by ")
+    @staticmethod
+    def channels(target: str) -> tuple[str, ...]:
+        """The components that a target is about."""
+        which, _ = target.split(" by ")
+        return CHANNELS if which == _ALL else (which,)
+
+    def functions(self, scene: Scene, target: str, channel: str) -> np.ndarray:
+        """(N, DEGREE + 1) polynomials of a target's quantity, which lies between -1 and 1."""
+        _, quantity = target.split(" by ")
         around = scene.once((UNEXPLAINED, "quantities"), lambda: _quantities(scene))
         if quantity in around:
             value = around[quantity]
@@ -165,26 +157,40 @@ class Course(Component):
             if quantity == "bend":
                 value = np.gradient(value) * scene.rate_hz * _AT_ONCE_S
         bounded = value if quantity == "time" else value / (1 + np.abs(value))
-        return np.asarray(legvander(bounded, self.DEGREE)[:, 1:])
-
-    def signal(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return np.asarray(self.functions(scene, target) @ values)
+        return np.asarray(legvander(bounded, self.DEGREE))
 
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        channel = self.channel(target)
-        columns = self.functions(scene, target).T
-        return np.stack([in_channel(scene, channel, column) for column in columns], axis=-1)
+        columns = [
+            in_channel(scene, channel, function)
+            for channel in self.channels(target)
+            for function in self.functions(scene, target, channel).T
+        ]
+        return np.stack(columns, axis=-1)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return np.asarray(self.tangent(scene, target, values) @ values)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        channel, quantity = target.split(" by ")
-        ((_, unit, size),) = self.reported(scene, target, values)
-        error = f"an error of {OF_THE_LAB[channel]} by {size:.1f} {unit} (RMS)"
-        return f"of unknown cause: {error} that goes along with {_ALONG[quantity]}"
+        along = _ALONG[target.split(" by ")[1]]
+        sizes = self.reported(scene, target, values)
+        errors = [
+            f"{OF_THE_LAB[channel]} by {size:.1f} {unit}"
+            for channel, (_, unit, size) in zip(self.channels(target), sizes, strict=True)
+        ]
+        return (
+            f"of unknown cause: an error (RMS) of {', '.join(errors)} that goes along with {along}"
+        )
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        signal = self.signal(scene, target, values)[scene.valid]
-        size = float(np.sqrt((signal**2).mean()))
-        return (("error", unit_of(self.channel(target)), size),)
+        change = self.change(scene, target, values)[scene.valid]
+        about = move_moments(change, place_of_stance_m(scene))
+        sizes = np.sqrt((about**2).mean(axis=0))
+        channels = self.channels(target)
+        names = ["error"] if len(channels) == 1 else [f"error_{channel}" for channel in channels]
+        return tuple(
+            (name, unit_of(channel), float(sizes[CHANNELS.index(channel)]))
+            for name, channel in zip(names, channels, strict=True)
+        )
 
 
 def _quantities(scene: Scene) -> Mapping[str, np.ndarray]:
@@ -204,4 +210,4 @@ def _quantities(scene: Scene) -> Mapping[str, np.ndarray]:
     }
 
 
-PATTERNS: tuple[Component, ...] = (Tone(), Course())
+PATTERNS: tuple[Nameless, ...] = (Tone(), Course())

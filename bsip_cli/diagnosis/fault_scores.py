@@ -28,7 +28,7 @@ _UNDETERMINED = (
 _DETERMINED = (
     1e-5  # of what the likeliest combination of parameters is determined: less is rounding
 )
-_MEDIANS = [np.nan, *chi2.median(np.arange(1, 20))]
+_MEDIANS = [np.nan, *chi2.median(np.arange(1, 50))]
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,7 @@ class Course(Nameless):
             for channel, (_, unit, size) in zip(self.channels(target), sizes, strict=True)
         ]
         return (
-            f"of unknown cause: an error (RMS) of {', '.join(errors)} that goes along with {along}"
+            f"of unknown cause: an error of {', '.join(errors)} (RMS) that goes along with {along}"
         )
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
@@ -210,4 +210,4 @@ def _quantities(scene: Scene) -> Mapping[str, np.ndarray]:
     }
 
 
-PATTERNS: tuple[Nameless, ...] = (Tone(), Course())
+NAMELESS: tuple[Nameless, ...] = (Tone(), Course())

@@ -25,14 +25,8 @@ from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
+from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import load_phi, loads_record, person_of
-from bsip_cli.stages.identification_problem import (
-    duration_s,
-    estimate_by,
-    prior_from,
-    problem_of,
-    recordings_of,
-)
 from bsip_cli.study.study import Trial
 from bsip_cli.study.trials import listed
 
@@ -262,10 +256,10 @@ def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence
             expected="a load on a segment with markers",
             remedy="record with markers there, or put the load on another segment",
         )
-    prior = prior_from(unit, unit.read("regression"), person)
+    prior = identification_problem.prior_from(unit, unit.read("regression"), person)
     heavy, plain = (_problem(loads_off, person, prior, trials) for trials in sets)
     estimator = unit.config.identify.estimators[0]
-    a, b = (estimate_by(estimator, problem) for problem in (plain, heavy))
+    a, b = (identification_problem.estimate_by(estimator, problem) for problem in (plain, heavy))
     change = difference(a, b, prior.root @ prior.root.T)
     one = _Block(TWO, change.phi, change.covariance, declared, change.resolution @ declared)
     rows = [one.total(), *one.rows(skeleton.body_names)]
@@ -292,8 +286,8 @@ def _names(person: Person, segments: Sequence[int]) -> str:
 
 
 def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) -> Problem:
-    recordings, _ = recordings_of(unit, person, trials)
-    seconds = duration_s(recordings)
+    recordings, _ = identification_problem.recordings_of(unit, person, trials)
+    seconds = identification_problem.duration_s(recordings)
     if seconds < _SHORTEST_S:
         raise BadDataError(
             f"{listing([trial.stem for trial in trials])}: {seconds:.2f} s of motion with every "
@@ -302,7 +296,7 @@ def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) 
             expected=f"at least {_SHORTEST_S:g} s",
             remedy="name other trials with --with and --without",
         )
-    problem, _ = problem_of(unit, person, prior, recordings)
+    problem, _ = identification_problem.problem_of(unit, person, prior, recordings)
     return problem
 
 

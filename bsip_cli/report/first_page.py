@@ -8,19 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report.blocks import (
-    Bar,
-    Block,
-    Bullets,
-    Heading,
-    Light,
-    Links,
-    Numbered,
-    Paragraph,
-    Portrait,
-    Scales,
-    Terms,
-)
+from bsip_cli.report import blocks, verdict
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     analysed,
@@ -41,14 +29,6 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.verdict import (
-    ALL_FAULTS,
-    CAUSE_UNKNOWN,
-    cause_line,
-    consequences,
-    light_of,
-    unseen,
-)
 from bsip_cli.report.words import METHODS, abbreviations, capital, count, listing, number
 
 if TYPE_CHECKING:
@@ -66,36 +46,38 @@ _USABLE = {
 }
 
 
-def front(record: ParticipantRecord) -> tuple[Block, ...]:
+def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
     light = light_for(record)
     return (
         *portrait(record),
-        Terms((*who(record),)),
-        Heading("Is anything wrong?"),
+        blocks.Terms((*who(record),)),
+        blocks.Heading("Is anything wrong?"),
         replace(light, text="") if record.causes and large_errors(record) else light,
-        Paragraph(_SIGNS, "note"),
+        blocks.Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
-        Heading("How large are the errors?"),
-        Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        Paragraph(
+        blocks.Heading("How large are the errors?"),
+        blocks.Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
+        blocks.Paragraph(
             f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
             f"{ENDS_AT:g} × large. {SOURCES}",
             "note",
         ),
         *_sure(record, light),
-        Heading("Which parameters to use"),
-        Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
-        Heading("What to do next"),
-        Bullets(tuple(to_do(record, light))),
+        blocks.Heading("Which parameters to use"),
+        blocks.Paragraph(
+            use_sentence(record.choice, record.identification, light.state == "large")
+        ),
+        blocks.Heading("What to do next"),
+        blocks.Bullets(tuple(to_do(record, light))),
     )
 
 
-def light_for(record: ParticipantRecord) -> Light:
+def light_for(record: ParticipantRecord) -> blocks.Light:
     """The answer, as `bsip show` prints it too."""
     large = large_errors(record)
-    return light_of(record.diagnosis, record.detection, record.budget, large, record.use())
+    return verdict.light_of(record.diagnosis, record.detection, record.budget, large, record.use())
 
 
 def large_errors(record: ParticipantRecord) -> list[str]:
@@ -134,7 +116,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
 # --- the person ---------------------------------------------------------------------------------
 
 
-def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
+def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The widest pose of the trials with a measured force; nothing without any pose."""
     found = [(trial, pose) for trial in record.trials for pose in _poses(record, trial)]
     if not found:
@@ -145,7 +127,7 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
     shows = f"{trial.label}: left grey, right black, ground force green"
     figure = stick_figure(pose, trial.label)
-    return (Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
+    return (blocks.Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
@@ -161,42 +143,44 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord) -> Iterator[Block]:
+def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """A line per cause that was found, the most probable first."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    lines = tuple(cause_line(cause, everywhere) for cause in record.causes)
+    lines = tuple(verdict.cause_line(cause, everywhere) for cause in record.causes)
     if lines:
-        yield Numbered(lines[:_MOST])
+        yield blocks.Numbered(lines[:_MOST])
     if len(lines) > _MOST:
         more = f"{count(len(lines) - _MOST, 'more finding')} below"
-        yield Links("", ((more, f"#{ALL_FAULTS}"),))
+        yield blocks.Links("", ((more, f"#{verdict.ALL_FAULTS}"),))
 
 
-def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
+def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
     """Of the error, of what was found, of what might have been missed; nothing where no search was
     made."""
     if record.diagnosis is None or record.detection is None:
         return
     said = []
     if light.state == "large":
-        unknown = ", its cause is not known" if CAUSE_UNKNOWN in light.title else ""
+        unknown = ", its cause is not known" if verdict.CAUSE_UNKNOWN in light.title else ""
         said.append(f"That the error is large is certain{unknown}.")
     if any(not is_large(cause) for cause in record.causes):
         said.append("Each fault states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
-    yield Heading("How sure is this?")
-    yield Paragraph(" ".join((*said, unseen(record.detection, record.diagnosis))).rstrip())
+    yield blocks.Heading("How sure is this?")
+    yield blocks.Paragraph(
+        " ".join((*said, verdict.unseen(record.detection, record.diagnosis))).rstrip()
+    )
 
 
-def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
+def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """What makes the error of the table's parameters, as one bar."""
     if record.budget is None:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
-        yield Bar(
+        yield blocks.Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
             pieces,
         )
@@ -216,12 +200,12 @@ def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...
 # --- what to do ---------------------------------------------------------------------------------
 
 
-def to_do(record: ParticipantRecord, light: Light) -> list[str]:
+def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """Whether the data may be used, and at most two things to do."""
     causes = record.causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said = [_USABLE[light.state], *said]
-    said += consequences(causes[:_MOST], only_actions=True)
+    said += verdict.consequences(causes[:_MOST], only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.report import errors
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
@@ -29,14 +30,6 @@ from bsip_cli.report.effect_words import (
     WEIGHT,
     effect_title,
     separating_recording,
-)
-from bsip_cli.report.errors import (
-    PARAMETERS,
-    REST,
-    UNKNOWN,
-    budget_sentences,
-    found_share,
-    overall_pieces,
 )
 from bsip_cli.report.words import (
     METHODS,
@@ -117,7 +110,7 @@ def verdict_of(
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
-            *(budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
+            *(errors.budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
             *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
@@ -163,7 +156,7 @@ def light_of(
     if not causes:
         title = "No fault found" if large is None else "Fine: no fault found, no large error"
         return Light("fine", title, nothing)
-    share = np.nan if budget is None else found_share(budget, effects_in(causes))
+    share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
     named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
     title = capital(found) if large is None else f"{capital(found)}; no large error"
@@ -187,11 +180,11 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    parts = () if budget is None or budget.empty else overall_pieces(budget, found)
+    parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
     most = max(parts, key=lambda one: one.share, default=None)
-    if most is None or most.label in (UNKNOWN, REST):
+    if most is None or most.label in (errors.UNKNOWN, errors.REST):
         return f", {CAUSE_UNKNOWN}"
-    if use == OM and PARAMETERS in most.label:
+    if use == OM and errors.PARAMETERS in most.label:
         return " even with identified parameters"
     how = "most" if most.share > 50.0 else "the largest part"
     return f", {how} of it {most.label} ({number(most.share, 0)} %)"

@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bsip_cli.statistics import samples
 from bsip_cli.statistics.hypothesis_tests import (
     PostHoc,
     cohens_d_pooled,
@@ -28,21 +29,12 @@ from bsip_cli.statistics.hypothesis_tests import (
     williams_t,
 )
 from bsip_cli.statistics.methods import ALTERNATIVES, MEASURED, OM, RM
-from bsip_cli.statistics.samples import (
-    TestResult,
-    adjusted_p_values,
-    finite_pairs,
-    finite_values,
-    lilliefors_test,
-    mean_of,
-    standard_deviation,
-)
 
 # --- one line of the cohort's results: a test, or a description, with all its numbers -------------
 
 
 @dataclass(frozen=True)
-class Comparison(TestResult):
+class Comparison(samples.TestResult):
     """A test of method_a against method_b.
 
     `p_holm` corrects for all rows of the same test with the same method_b in the same table.
@@ -85,7 +77,9 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
             families[row.topic.table, row.test, row.method_b].append(place)
     corrected = list(comparisons)
     for places in families.values():
-        adjusted = adjusted_p_values([comparisons[place].p_value for place in places], "holm")
+        adjusted = samples.adjusted_p_values(
+            [comparisons[place].p_value for place in places], "holm"
+        )
         for place, p in zip(places, adjusted, strict=True):
             corrected[place] = replace(comparisons[place], p_holm=p)
     return tuple(corrected)
@@ -198,7 +192,7 @@ class Pair:
     y: Sample
     origin: Origin
 
-    def row(self, test: str, origin: Origin, result: TestResult, **more: Any) -> Comparison:
+    def row(self, test: str, origin: Origin, result: samples.TestResult, **more: Any) -> Comparison:
         return Comparison(self.topic, test, origin, OM, self.other, **(vars(result) | more))
 
 
@@ -213,15 +207,15 @@ def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[
 
 def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
     """Mean and SD of one method, without a test."""
-    x = finite_values(per_participant(values, (method,))[:, 0])
-    found = {"n": len(x), "mean_a": mean_of(x), "sd_a": standard_deviation(x)}
+    x = samples.finite_values(per_participant(values, (method,))[:, 0])
+    found = {"n": len(x), "mean_a": samples.mean_of(x), "sd_a": samples.standard_deviation(x)}
     return Comparison(topic, "description", "published", method, **found)  # type: ignore[arg-type]
 
 
 def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
-    normality = lilliefors_test(np.subtract(*finite_pairs(pair.x, pair.y)))
+    normality = samples.lilliefors_test(np.subtract(*samples.finite_pairs(pair.x, pair.y)))
     by_t = pair.row(
         "paired_t",
         pair.origin,
@@ -231,7 +225,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
-    d_z = TestResult(n=test.n, difference=test.difference, reason=test.reason)
+    d_z = samples.TestResult(n=test.n, difference=test.difference, reason=test.reason)
     d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
     ranks = wilcoxon(pair.x, pair.y)
     by_rank = pair.row("wilcoxon", "added", ranks, effect_size_name="rank-biserial")
@@ -240,7 +234,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
 
 def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
     """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    other = mean_of(finite_pairs(pair.x, pair.y)[1])
+    other = samples.mean_of(samples.finite_pairs(pair.x, pair.y)[1])
     bound = abs(other) * criteria.equivalence_percent / 100.0
     return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
 
@@ -265,9 +259,11 @@ def methods_compared(
     table : shape (participants, methods), in the topic's unit.
     """
     table = table[np.isfinite(table).all(axis=1)]
-    of_each = [lilliefors_test(column) for column in table.T]
+    of_each = [samples.lilliefors_test(column) for column in table.T]
     pairs = combinations(range(len(methods)), 2)
-    differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
+    differences = {
+        (i, j): samples.lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs
+    }
     why = all_reasons(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
     between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
@@ -328,7 +324,7 @@ def _tests_of_topic(
         yield from methods_compared(topic, columns, methods, alpha)
     for pair in pairs_of(topic, values, "published" if is_published else "added"):
         if only_described:  # means and SDs
-            means = described_pair(*finite_pairs(pair.x, pair.y))
+            means = described_pair(*samples.finite_pairs(pair.x, pair.y))
             yield pair.row("description", pair.origin, means)
         elif table != "table3" or pair.other != RM:
             yield from t_and_rank_tests(pair, alpha)
@@ -362,8 +358,8 @@ class PersonTest:
 
     participant: str
     topic: Topic
-    williams: TestResult
-    fisher: TestResult
+    williams: samples.TestResult
+    fisher: samples.TestResult
 
     def values(self) -> tuple[Value, ...]:
         one, other = self.williams, self.fisher

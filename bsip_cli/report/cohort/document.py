@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import errors
 from bsip_cli.report.blocks import (
     WORDS,
     Block,
@@ -34,14 +35,6 @@ from bsip_cli.report.cohort.record import (
     Searched,
     named_people,
     shared_causes,
-)
-from bsip_cli.report.errors import (
-    COP_LIMIT_M,
-    ENDS_AT,
-    FORCE_LIMIT_PERCENT,
-    Yardstick,
-    one_number_alone,
-    yardsticks,
 )
 from bsip_cli.report.figures.charts import Strip, gain_dots, strips
 from bsip_cli.report.records import how_made
@@ -129,13 +122,13 @@ def _front(record: CohortRecord) -> Iterator[Block]:
         yield Paragraph("Nobody is missing.")
 
 
-def _yardsticks(record: CohortRecord) -> tuple[Yardstick, ...]:
+def _yardsticks(record: CohortRecord) -> tuple[errors.Yardstick, ...]:
     diagnosis = record.defaults["diagnosis"]
     limits = (
         record.made.number(f"diagnosis.{name}", float(diagnosis[name]))
-        for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT)
+        for name in (errors.COP_LIMIT_M, errors.FORCE_LIMIT_PERCENT)
     )
-    return yardsticks(*limits)
+    return errors.yardsticks(*limits)
 
 
 def _strips(record: CohortRecord) -> Iterator[Block]:
@@ -147,7 +140,9 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(Strip(title, values, names, far, one.good, one.limit, ENDS_AT * one.limit))
+        drawn.append(
+            Strip(title, values, names, far, one.good, one.limit, errors.ENDS_AT * one.limit)
+        )
         rows[one.name] = list(values)
         far_out += [
             (
@@ -351,7 +346,7 @@ def _one_number(ratios: Ratios) -> Iterator[Block]:
         rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
         if np.isfinite(rm_mass):
             over = (1 + om) / (1 + rm_mass) - 1
-            yield Paragraph(one_number_alone(component_label(name), rm_mass, om, over))
+            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om, over))
 
 
 def _typical(ratios: np.ndarray) -> float:

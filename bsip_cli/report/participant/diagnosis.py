@@ -7,6 +7,7 @@ from math import inf, isfinite
 
 import pandas as pd
 
+from bsip_cli.report import verdict
 from bsip_cli.report.blocks import Block, Grid, Heading, Numbered, Paragraph, Section
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.effect_words import (
@@ -18,13 +19,6 @@ from bsip_cli.report.effect_words import (
     usual_words,
 )
 from bsip_cli.report.records import ParticipantRecord
-from bsip_cli.report.verdict import (
-    ALL_FAULTS,
-    NOT_RUN,
-    corrected_sentence,
-    probability_words,
-    verdict_of,
-)
 from bsip_cli.report.words import MISSING, number, percent
 
 _NEAREST = 4  # rejected causes that are listed
@@ -34,15 +28,15 @@ _FAR = 20.0  # times the largest usual size: not seen at all
 
 def section(record: ParticipantRecord) -> Section:
     if record.diagnosis is None or record.detection is None:
-        blocks: tuple[Block, ...] = (Paragraph(NOT_RUN, "note"),)
-        return Section(ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
+        blocks: tuple[Block, ...] = (Paragraph(verdict.NOT_RUN, "note"),)
+        return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
     tables = (record.diagnosis, record.detection, record.gains, record.changes)
-    said = verdict_of(*tables)
+    said = verdict.verdict_of(*tables)
     events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
     named_from = percent(record.option("diagnosis", "named_from"))
     blocks = (
         *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
-        *(Paragraph(text) for text in (*corrected_sentence(events), *said.results)),
+        *(Paragraph(text) for text in (*verdict.corrected_sentence(events), *said.results)),
         *nearest(candidates_of(record.diagnosis)),
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),
@@ -55,7 +49,7 @@ def section(record: ParticipantRecord) -> Section:
             "smallest group that holds as much."
         ),
     )
-    return Section(ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
+    return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
 
 
 # --- causes -------------------------------------------------------------------------------------
@@ -69,7 +63,7 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
     rows = tuple(
         (
             one.label,
-            probability_words(one.probability) or MISSING,
+            verdict.probability_words(one.probability) or MISSING,
             number(one.rms_change, 1),
             one.removes(),
         )

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import records
 from bsip_cli.report.blocks import (
     WORDS,
     Block,
@@ -25,14 +26,6 @@ from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.participant import diagnosis, errors
-from bsip_cli.report.records import (
-    HowMade,
-    ParticipantRecord,
-    TrialRecord,
-    clock_of,
-    flags_of,
-    how_made,
-)
 from bsip_cli.report.words import (
     MISSING,
     ROLES,
@@ -58,9 +51,9 @@ CANNOT_KNOW = (
 )
 
 
-def participant_document(record: ParticipantRecord) -> Document:
+def participant_document(record: records.ParticipantRecord) -> Document:
     made = [Heading("What cannot be known"), Bullets(CANNOT_KNOW)]
-    made += how_made(HowMade.of(record.origins), record.defaults)
+    made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
         subtitle="Ground forces measured by plates, against those computed from markers.",
@@ -86,7 +79,7 @@ _LEVELS = ("excluded", "warning", "corrected")
 _MM = 1000.0
 
 
-def recording_section(record: ParticipantRecord) -> Section:
+def recording_section(record: records.ParticipantRecord) -> Section:
     refused = tuple(f"{r.unit or record.id}, {r.stage}: {r.sentence}" for r in record.refusals)
     blocks: list[Block] = [_trials(record)]
     if refused:
@@ -95,7 +88,7 @@ def recording_section(record: ParticipantRecord) -> Section:
     return Section("recording", "What was recorded?", tuple(blocks))
 
 
-def _trials(record: ParticipantRecord) -> Grid:
+def _trials(record: records.ParticipantRecord) -> Grid:
     head = (
         "recording",
         "role",
@@ -113,14 +106,14 @@ def _trials(record: ParticipantRecord) -> Grid:
     )
 
 
-def _trial_row(trial: TrialRecord) -> tuple[str | Cell, ...]:
+def _trial_row(trial: records.TrialRecord) -> tuple[str | Cell, ...]:
     role = ROLES[trial.role]
     frame = trial.kinematics
     if frame is None or frame.empty:
         return (trial.label, role, MISSING, MISSING, MISSING, MISSING)
     compared = np.nan
-    if trial.reconstruction is not None and len(clock_of(trial.reconstruction)):
-        compared = float(flags_of(trial.reconstruction, "valid").mean())
+    if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
+        compared = float(records.flags_of(trial.reconstruction, "valid").mean())
     rms = frame["marker_rms_m"].to_numpy(dtype=float)
     rms = rms[np.isfinite(rms)]
     return (
@@ -133,7 +126,7 @@ def _trial_row(trial: TrialRecord) -> tuple[str | Cell, ...]:
     )
 
 
-def _loads(record: ParticipantRecord) -> Iterator[Block]:
+def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
     """What the person carried as the study says, and what was made of it."""
     trials_of: dict[str, list[str]] = {}
     for trial, words in record.loads:
@@ -146,7 +139,7 @@ def _loads(record: ParticipantRecord) -> Iterator[Block]:
         )
 
 
-def _findings(record: ParticipantRecord) -> Iterator[Block]:
+def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
     """What ingest repaired, warned of or left out: one line per check, with its recordings."""
     found: dict[tuple[str, str, str], dict[str, set[str]]] = {}
     for trial in record.trials:
@@ -177,7 +170,7 @@ def _findings(record: ParticipantRecord) -> Iterator[Block]:
 # --- markers ------------------------------------------------------------------------------------
 
 
-def _markers(record: ParticipantRecord) -> Iterator[Block]:
+def _markers(record: records.ParticipantRecord) -> Iterator[Block]:
     frames = [t.residuals for t in record.trials if t.residuals is not None]
     rows = pd.concat(frames) if frames else pd.DataFrame({"marker": [], "residual_m": []})
     squares = rows["residual_m"].astype(float) ** 2
@@ -201,7 +194,7 @@ def _markers(record: ParticipantRecord) -> Iterator[Block]:
     )
 
 
-def _events(record: ParticipantRecord) -> Iterator[Block]:
+def _events(record: records.ParticipantRecord) -> Iterator[Block]:
     """What the inverse kinematics says of single markers; nothing where it was not asked."""
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
     lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
@@ -224,12 +217,12 @@ _RATIOS = ("om", "rm_mass", "om_rm_mass")
 _MOST_STEPS = 3
 
 
-def parameters_section(record: ParticipantRecord) -> Section:
+def parameters_section(record: records.ParticipantRecord) -> Section:
     blocks = (*_choice(record), *_masses(record), *_next(record))
     return Section("parameters", "Which segment parameters come out?", blocks)
 
 
-def _choice(record: ParticipantRecord) -> Iterator[Block]:
+def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
     """Nothing where ``choose`` has not run."""
     choice = record.choice
     if choice is None or choice.empty:
@@ -268,7 +261,7 @@ def _ratio(row: Mapping, name: str) -> str:
 # --- parameters ---------------------------------------------------------------------------------
 
 
-def _masses(record: ParticipantRecord) -> Iterator[Block]:
+def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     rm, om = record.method(RM), record.method(OM)
     if om.empty or rm.empty:
         gone = OM if om.empty else RM
@@ -329,7 +322,7 @@ def _masses(record: ParticipantRecord) -> Iterator[Block]:
     )
 
 
-def _next(record: ParticipantRecord) -> Iterator[Block]:
+def _next(record: records.ParticipantRecord) -> Iterator[Block]:
     """What to record to know more."""
     table = record.excitation
     if table.empty:

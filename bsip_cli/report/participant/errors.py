@@ -8,20 +8,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import errors
 from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
 from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
-from bsip_cli.report.errors import (
-    LEAST_REPORTED_SIZE,
-    Gain,
-    gains_of,
-    one_number_alone,
-    overall_pieces,
-    pieces,
-    pooled_gains,
-    relative_change,
-    size_of,
-)
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
@@ -104,14 +94,14 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     found = effects_in(record.causes)
     bars = []
     for component in COMPONENTS:
-        size, unit = size_of(record.budget, component)
-        if size >= LEAST_REPORTED_SIZE:
-            parts = pieces(record.budget, component, found)
+        size, unit = errors.size_of(record.budget, component)
+        if size >= errors.LEAST_REPORTED_SIZE:
+            parts = errors.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
         yield Picture(
-            error_bars(bars, overall_pieces(record.budget, found)),
+            error_bars(bars, errors.overall_pieces(record.budget, found)),
             "error_budget",
             "What makes the error of the table's parameters (RM) in each component, and how large it "
             "is, over all recordings.",
@@ -129,7 +119,7 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
 
 def _grid(record: ParticipantRecord) -> Iterator[Block]:
     fits = [(t, t.fit) for t in record.moving_trials() if t.fit is not None]
-    gains = [gain for trial, fit in fits for gain in gains_of(trial.label, fit)]
+    gains = [gain for trial, fit in fits for gain in errors.gains_of(trial.label, fit)]
     known = [gain for gain in gains if gain.component in _SHOWN]
     if not known:
         yield Paragraph("No recording could be compared with both methods.", "warning")
@@ -141,7 +131,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
             "warning",
         )
     yield from _one_number(record, gains)
-    by_trial: dict[str, dict[str, Gain]] = {}
+    by_trial: dict[str, dict[str, errors.Gain]] = {}
     for gain in known:
         by_trial.setdefault(gain.trial, {})[gain.component] = gain
     rows = []
@@ -162,7 +152,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
     )
 
 
-def _cell(gain: Gain | None, method: str) -> Cell:
+def _cell(gain: errors.Gain | None, method: str) -> Cell:
     """The error, marked where it is smaller than those of all others."""
     if gain is None:
         return Cell(number(None))
@@ -171,15 +161,19 @@ def _cell(gain: Gain | None, method: str) -> Cell:
     return Cell(number(own, 1), "better" if own < min(others) * (1.0 - SAME_WITHIN) else "")
 
 
-def _one_number(record: ParticipantRecord, gains: list[Gain]) -> Iterator[Block]:
+def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator[Block]:
     """What one number for the whole mass is, and does without identification."""
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
-    found = [m for m in pooled_gains(held_out) if m.component == "grf_vertical" and RM_MASS in m.of]
+    found = [
+        m
+        for m in errors.pooled_gains(held_out)
+        if m.component == "grf_vertical" and RM_MASS in m.of
+    ]
     if len(rows) and found:
         (mean,) = found
-        over = relative_change(mean.of[RM_MASS], mean.of[OM])
-        said = one_number_alone(
+        over = errors.relative_change(mean.of[RM_MASS], mean.of[OM])
+        said = errors.one_number_alone(
             component_label(mean.component), mean.change(RM_MASS), mean.change(), over
         )
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")

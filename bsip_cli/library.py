@@ -52,8 +52,6 @@ Key = tuple[str, str]  # kind of table; trial, or nothing where it is of the per
 class Plate:
     """What a force plate measured, on the body that stands on it.
 
-    Attributes
-    ----------
     force_N, moment_Nm : (n, 3) in the world's axes (Z up), moments about the world's origin; a
         person who stands gives a positive Z. NaN where a sample cannot be used.
     corners_m : (4, 3) of the surface, in order round it, world.
@@ -67,10 +65,7 @@ class Plate:
 def read(path: str | Path) -> Opened:
     """A recording's file: a ``.c3d``, or a ``.trc`` with the file of ground forces next to it.
 
-    Raises
-    ------
-    BadDataError
-        The file is none of these, or is damaged; the sentence says what was found.
+    BadDataError: The file is none of these, or is damaged; the sentence says what was found.
     """
     return open_recording(Path(path))
 
@@ -84,16 +79,11 @@ def recording(
 ) -> Opened:
     """A recording from arrays.
 
-    Parameters
-    ----------
     labels : of m markers.
     markers_m : (n, m, 3), world (Z up); NaN where a marker is not seen.
     rate_hz : of the markers. analog_rate_hz : of the plates, a multiple of it; by default the same.
 
-    Raises
-    ------
-    UsageError
-        Shapes or rates do not fit together.
+    UsageError: Shapes or rates do not fit together.
     """
     analog_rate_hz = analog_rate_hz or rate_hz
     markers_m = np.asarray(markers_m, dtype=float)
@@ -149,23 +139,16 @@ def _source(name: str, plate: Plate, count: int) -> C3dPlate:
 class Person:
     """A person, the recordings, and what the stages make of them.
 
-    Parameters
-    ----------
     trials : recordings by name: a task, with ``_run-2`` where it was done again ("walking_run-2").
         ``static`` calibrates, ``sequence`` identifies, as ``options["roles"]`` says.
     sex : "M", "F" or "other" (the mean of both tables).
     mass_kg, height_m : None where not known: then from the recordings, where they decide it.
     options : as in study.toml, for example ``{"marker_set": "hansen2017"}``.
 
-    Attributes
-    ----------
     messages : what the stages had to say, in order.
     refused : by stage and trial (empty: the person), why it could not be done.
 
-    Raises
-    ------
-    UsageError
-        Unknown options, or a name that is none of a trial.
+    UsageError: Unknown options, or a name that is none of a trial.
     """
 
     def __init__(
@@ -245,10 +228,7 @@ class Person:
     def table(self, kind: str, trial: str = "") -> pd.DataFrame:
         """Any table that has been made, by its kind and trial, as docs/artifacts.md names it.
 
-        Raises
-        ------
-        KeyError
-            It has not been made.
+        KeyError: It has not been made.
         """
         stems = {name: stem for stem, name in self._names.items()}
         return self._kept[kind, stems[trial] if trial else ""].frame.copy()
@@ -267,10 +247,7 @@ class Person:
     def _run(self, last: str) -> None:
         """What a stage needs, and itself, once; a trial that is refused does not stop the others.
 
-        Raises
-        ------
-        BsipError
-            The person cannot be done.
+        BsipError: The person cannot be done.
         """
         for stage in _needed(last):
             if stage.label in self._done:

@@ -336,10 +336,7 @@ def _export(
 def _chosen(unit: Unit) -> tuple[str, str]:
     """The method that `bsip choose` found best over all movements, and why.
 
-    Raises
-    ------
-    UsageError
-        It has not chosen, or of an earlier identification.
+    UsageError: It has not chosen, or of an earlier identification.
     """
     path = unit.path("choice")
     if not path.exists() or not is_made_from(path, unit.path("identification")):
@@ -356,12 +353,8 @@ def _chosen(unit: Unit) -> tuple[str, str]:
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:
     """The participant's geometry and one method's inertias, as the artifacts have them.
 
-    Raises
-    ------
-    UsageError
-        There is no such method.
-    BadDataError
-        The tables belong to another skeleton, or hold no numbers.
+    UsageError: There is no such method.
+    BadDataError: The tables belong to another skeleton, or hold no numbers.
     """
     tables = {kind: unit.read(kind) for kind in _READER.reads}
     rows = tables["bsip"]

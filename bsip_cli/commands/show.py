@@ -33,12 +33,8 @@ _MOST = 3  # causes of a person, without --full: all fits on a screen of 24 line
 def shown(out: Path, full: bool = False) -> Iterator[str]:
     """The parts of the answer, in order; with ``full`` tables and causes with all their numbers.
 
-    Raises
-    ------
-    UsageError
-        Nothing to show has been written there, or it is a file.
-    BadDataError
-        A diagnosis cannot be read.
+    UsageError: Nothing to show has been written there, or it is a file.
+    BadDataError: A diagnosis cannot be read.
     """
     if out.is_file():
         raise UsageError(

@@ -136,8 +136,6 @@ class Cell:
 class Grid(Block):
     """A table.
 
-    Attributes
-    ----------
     head : titles of the columns, with units.
     rows : as many cells each as ``head``; a string is a plain cell.
     groups : titles over several columns, with how many they span; empty for none.
@@ -162,8 +160,6 @@ class Grid(Block):
 class Picture(Block):
     """A figure, and what a reader wants to know of it.
 
-    Attributes
-    ----------
     shows : what is drawn. reading : what better and worse look like. action : what to do then.
     name : of its files: NAME.svg, and NAME.csv with ``data``, the numbers behind it.
     """
@@ -224,9 +220,7 @@ class Document:
 # --- a document as one self-contained HTML page ---------------------------------------------------
 
 
-FILES = "figures"
-"""Folder next to the page that holds its figures and the numbers behind them."""
-
+FILES = "figures"  # folder next to the page that holds its figures and the numbers behind them
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
 

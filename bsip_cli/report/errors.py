@@ -181,9 +181,7 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
-ENDS_AT = 2.0
-"""Times the size that is called large, where every scale ends."""
-
+ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""

@@ -124,8 +124,7 @@ class ParticipantRecord:
         return float((ran or [self.defaults[section]])[0][name])
 
 
-Message = tuple[str, str, str]
-"""Stage, unit, text."""
+Message = tuple[str, str, str]  # stage, unit, text
 
 
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:

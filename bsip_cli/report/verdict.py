@@ -45,9 +45,7 @@ from bsip_cli.report.words import (
 )
 from bsip_cli.statistics.methods import OM, RM
 
-ALL_FAULTS = "wrong"
-"""Address of the section that has all of them."""
-
+ALL_FAULTS = "wrong"  # address of the section that has all of them
 _NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
@@ -69,8 +67,6 @@ NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 class Verdict:
     """All that is said of a diagnosis.
 
-    Attributes
-    ----------
     headline : whether anything is wrong. found : whether anything was.
     causes : a text per cause or group of causes that cannot be distinguished here.
     results : what the causes do to forces and parameters, and where they were looked for.

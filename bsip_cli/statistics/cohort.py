@@ -88,9 +88,7 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
 # --- values, and those that belong to one line of a table -----------------------------------------
 
 
-DIFFERENCE = f"|{OM}-{RM}|"
-"""The method of a value that is how far both are apart."""
-
+DIFFERENCE = f"|{OM}-{RM}|"  # the method of a value that is how far both are apart
 OVER_TASKS = ("table2", "table3", "table6")
 """Tables of the identification sequence, under whatever task names it was recorded."""
 
@@ -161,11 +159,8 @@ def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
 
-DATA_SHARE = "_data_share"
-"""Ending of the variable that says how far the data decided a mass."""
-
-PAIR = f"{OM}-{RM}"
-"""In the column of methods: of the difference between the two."""
+DATA_SHARE = "_data_share"  # ending of the variable that says how far the data decided a mass
+PAIR = f"{OM}-{RM}"  # in the column of methods: of the difference between the two
 
 
 @dataclass(frozen=True)

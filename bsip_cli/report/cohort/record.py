@@ -21,8 +21,7 @@ from bsip_cli.statistics.samples import p_of_one_size
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
 
-ReadValues = Callable[[str, str], pd.DataFrame]
-"""Table and variable to their rows of ``values``."""
+ReadValues = Callable[[str, str], pd.DataFrame]  # table and variable to their rows of ``values``
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +135,7 @@ _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
-Cause = tuple[Candidate, ...]
-"""A single candidate, or all of a group of which one is there."""
+Cause = tuple[Candidate, ...]  # a single candidate, or all of a group of which one is there
 
 
 @dataclass(frozen=True)

@@ -264,8 +264,6 @@ def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
 class Panel:
     """Signals of one quantity.
 
-    Attributes
-    ----------
     title : what it is, with its unit.
     time_s : (n,).
     signals : label of the method -> (n,), NaN where there are none.

@@ -89,8 +89,6 @@ _ON_GROUND_PERCENTILE = 2.0
 class Pose:
     """Positions and force in the person's axes (anterior, right, up).
 
-    Attributes
-    ----------
     bones_m : (b, 2, 3) end points; sides : (b,) ``l``, ``r`` or empty.
     head_m : (3,) centre; head_radius_m : its radius. markers_m : (m, 3) as the model carries them.
     force_at_m : (3,) where the ground force acts; force_N : (3,), NaN where it is not measured.

@@ -217,8 +217,6 @@ def build_tables(
 ) -> tuple[Table, ...]:
     """The six tables as data, and the first four next to the published values.
 
-    Parameters
-    ----------
     comparisons : the artifact of ``stats``.
     criteria : the options with which it was computed.
     fitted_on : what each task's data were to OM, as a fact of the values: ``table``, ``task``,

@@ -179,8 +179,7 @@ def _rounded(value: float, decimals: int) -> str:
 
 # --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
 
-NAMED_AT_MOST = 6
-"""Missing participants and rows that are named one by one."""
+NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
 
 
 def participants(rows: Iterable[Comparison]) -> str:

@@ -11,15 +11,11 @@ from bsip_cli.statistics.cohort import DATA_SHARE, DIFFERENCE, Comparison, Crite
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.published import load_paper
 
-SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}
-"""Methods in the names of CSV columns."""
-
+SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}  # methods in the names of CSV columns
 _PREFIX = {RM: "", RM_MASS: "rm_mass_"}
 """Of the CSV columns with tests of OM against another method."""
 
-_P = {RM: "p", RM_MASS: "p OM, RM+mass"}
-"""Headings of the columns that carry the stars."""
-
+_P = {RM: "p", RM_MASS: "p OM, RM+mass"}  # headings of the columns that carry the stars
 REASON = model.Column(("reason",))
 _N = model.column("n", "paired_t.n", "n", model.count)
 _LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))

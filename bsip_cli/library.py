@@ -14,7 +14,7 @@ Tables are those of the artifacts: docs/artifacts.md lists their columns, units 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
@@ -45,7 +45,6 @@ from bsip_cli.study.trials import Trial, trial_named
 
 _NOWHERE = Path("memory")
 _ID = "sub-01"
-Key = tuple[str, str]  # kind of table; trial, or nothing where it is of the person
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +165,7 @@ class Person:
         self.messages: list[str] = []
         self.refused: dict[tuple[str, str], BsipError] = {}
         self._done: set[str] = set()
-        self._kept: dict[Key, _Kept] = {}
+        self._kept: dict[Path, _Kept] = {}
         roles = self.config.roles.model_dump()
         named = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
         self._recordings = {named[name].stem: opened for name, opened in trials.items()}
@@ -231,7 +230,9 @@ class Person:
         KeyError: It has not been made.
         """
         stems = {name: stem for stem, name in self._names.items()}
-        return self._kept[kind, stems[trial] if trial else ""].frame.copy()
+        stem = stems[trial] if trial else ""
+        own = next((one for one in self._participant.trials if one.stem == stem), None)
+        return self._kept[self._unit(producer(kind)).path(kind, own)].frame.copy()
 
     # --- running them -------------------------------------------------------------------------
 
@@ -305,22 +306,12 @@ class _Kept:
 
 @dataclass
 class _InMemory(Unit):
-    """A unit whose tables stay in memory."""
+    """A unit whose tables stay in memory, by the paths that they would have."""
 
-    kept: dict[Key, _Kept] = field(default_factory=dict)
+    kept: dict[Path, _Kept] = field(default_factory=dict)
 
-    def _key(self, kind: str, trial: Trial | None = None) -> Key:
-        owner = trial or self.trial
-        return kind, owner.stem if producer(kind).level == "trial" and owner else ""
-
-    def stands(
-        self,
-        kind: str,
-        trial: Trial | None,
-        participant: Participant | None,
-        names: Collection[str] | None = None,
-    ) -> bool:
-        return self._key(kind, trial) in self.kept
+    def _names(self, participant: Participant | None) -> frozenset[str]:
+        return frozenset(path.name for path in self.kept)
 
     def read(
         self,
@@ -329,7 +320,7 @@ class _InMemory(Unit):
         participant: Participant | None = None,
         **wanted: Collection[str],
     ) -> pd.DataFrame:
-        frame = self.kept[self._key(kind, trial)].frame
+        frame = self.kept[self.path(kind, trial, participant)].frame
         for column, values in wanted.items():
             frame = frame[frame[column].isin(list(values))]
         return frame.reset_index(drop=True)
@@ -337,19 +328,14 @@ class _InMemory(Unit):
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> dict:
-        return self.kept[self._key(kind, trial)].facts
+        return self.kept[self.path(kind, trial, participant)].facts
 
     def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
         plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
-        self.kept[self._key(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
-
-    def write_in_parts(
-        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
-    ) -> None:
-        self.write(kind, pd.concat(list(parts), ignore_index=True), facts())
+        self.kept[self.path(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:
-        before = self.kept[self._key(kind)]
+        before = self.kept[self.path(kind)]
         made = before.frame.iloc[: before.rows_made]
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        self.kept[self._key(kind)] = replace(before, frame=as_read(kind, whole))
+        self.kept[self.path(kind)] = replace(before, frame=as_read(kind, whole))

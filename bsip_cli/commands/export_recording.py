@@ -151,10 +151,8 @@ class _Correction:
         self._diagnosis = diagnosis = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
         for cause in named.causes_here(unit, [*self._plates], [*self._zeros]):
-            words, alike = (
-                named.called(cause.effect.name, cause.target),
-                named.alike(cause, diagnosis),
-            )
+            words = named.called(cause.effect.name, cause.target)
+            alike = named.alike(cause, diagnosis)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(named.called(*one) for one in alike)
             if isinstance(cause.effect, MarkerSwap):
@@ -217,7 +215,12 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
-            *(_zero_words(*one) for one in self._zeros.items() if is_noticed(one[1])),
+            *(
+                f"plate {name}: its reading without load, "
+                f"({', '.join(f'{x:.1f}' for x in zero[:3])}) N, subtracted"
+                for name, zero in self._zeros.items()
+                if is_noticed(zero)
+            ),
             *(named.words_of(*x, self._scene, self._diagnosis) for x in self.causes.items()),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
@@ -376,11 +379,6 @@ def _stated(reading: PlateReading) -> PlateReading:
     return replace(
         reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
     )
-
-
-def _zero_words(name: str, zero: np.ndarray) -> str:
-    force = ", ".join(f"{x:.1f}" for x in zero[:3])
-    return f"plate {name}: its reading without load, ({force}) N, subtracted"
 
 
 def _in_reading(

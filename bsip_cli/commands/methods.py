@@ -17,6 +17,7 @@ from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
 from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.records import flat
 from bsip_cli.report.words import listing
 
 _WITH_OPTIONS = ("wrench", "skeleton", "kinematics", "regression", "bsip", "fit")
@@ -82,6 +83,9 @@ class _Results:
     def _tables(self, kind: str) -> Iterator[pd.DataFrame]:
         return (read_artifact(path, kind) for path in self._files(kind))
 
+    def has(self, kind: str) -> bool:
+        return any(True for _ in self._files(kind))
+
     @cached_property
     def _made(self) -> list[Mapping[str, Any]]:
         """Who made the artifacts, one of each kind and person or trial."""
@@ -94,7 +98,8 @@ class _Results:
         """By name, the values with which the artifacts were made; more than one if they differ."""
         found: dict[str, dict[str, Any]] = {}
         for made in self._made:
-            for name, value in _flat(made["options"]):
+            known = {name: x for name, x in made["options"].items() if name != "participant"}
+            for name, value in flat(known):
                 found.setdefault(name, {})[json.dumps(value)] = value
         return {name: list(values.values()) for name, values in found.items()}
 
@@ -109,7 +114,7 @@ class _Results:
     @property
     def changed(self) -> list[str]:
         """``name = value`` of options other than the defaults."""
-        defaults = dict(_flat(load_config([]).model_dump(mode="json")))
+        defaults = dict(flat(load_config([]).model_dump(mode="json")))
         return [
             f"{name} = {json.dumps(values[0])}"
             for name, values in sorted(self._options.items())
@@ -179,10 +184,6 @@ class _Results:
         return listing([f"{use} for {n}" for use, n in sorted(uses.items())], empty="")
 
     @property
-    def is_diagnosed(self) -> bool:
-        return any(True for _ in self._files("diagnosis"))
-
-    @property
     def causes(self) -> str:
         """Named causes and in how many persons."""
         found: Counter[str] = Counter()
@@ -193,17 +194,3 @@ class _Results:
                 named = table.loc[table["verdict"] == "named", "effect"]
                 found.update(set(named) - set(_NO_FAULT))
         return listing([f"{effect_title(effect)} ({n})" for effect, n in found.most_common()], "")
-
-    @property
-    def has_joints(self) -> bool:
-        return any(True for _ in self._files("joint-moments"))
-
-
-def _flat(options: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Entries of nested options as ``section.name``; what is known of the participant left out."""
-    for name, value in options.items():
-        if isinstance(value, Mapping):
-            if name != "participant":
-                yield from _flat(value, f"{before}{name}.")
-        else:
-            yield f"{before}{name}", value

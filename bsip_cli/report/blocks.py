@@ -235,7 +235,7 @@ def render(document: Document) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["svg_source"] = _svg_source
+    environment.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
     environment.filters["tied"] = _tied
     style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
     return environment.get_template("report.html.j2").render(
@@ -252,10 +252,6 @@ def _cleaned(value: object) -> object:
 def _tied(text: str) -> str:
     """Numbers and their units stay on one line."""
     return re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
-
-
-def _svg_source(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
 
 
 _GLOSSARY = (

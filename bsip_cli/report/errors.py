@@ -325,7 +325,8 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     for terms in _groups(rows):
         label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
         share = float(rows.loc[list(terms), "share_percent"].sum())
-        piece = Piece(label, share, tuple(dict.fromkeys(map(_kind, terms))))
+        kinds = [cause_colours.FAULT if term.startswith(_FAULT) else term for term in terms]
+        piece = Piece(label, share, tuple(dict.fromkeys(kinds)))
         least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
@@ -354,10 +355,6 @@ def term_words(term: str) -> str:
     if term.startswith(_FAULT):
         return EFFECT_WORDS[term.removeprefix(_FAULT)].title
     return _WORDS[term]
-
-
-def _kind(term: str) -> str:
-    return cause_colours.FAULT if term.startswith(_FAULT) else term
 
 
 def _label(term: str, found: Collection[str]) -> str:

@@ -33,11 +33,8 @@ def run(unit: Unit) -> None:
 def record_of(unit: Unit) -> record.CohortRecord:
     """Everything that is there of the whole study."""
     facts = unit.facts("values")
-    options = unit.config.stats
-    criteria, compared = (
-        Criteria(options.alpha, options.equivalence_percent),
-        unit.read("comparisons"),
-    )
+    criteria = Criteria(unit.config.stats.alpha, unit.config.stats.equivalence_percent)
+    compared = unit.read("comparisons")
 
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from bsip_cli.statistics import samples
 from bsip_cli.statistics.hypothesis_tests import (
-    PostHoc,
     cohens_d_pooled,
     d_of_differences,
     described_pair,
@@ -158,6 +156,7 @@ def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[
 
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
+_MEANS = ("n", "mean_a", "sd_a", "mean_b", "sd_b")
 
 DATA_SHARE = "_data_share"  # ending of the variable that says how far the data decided a mass
 PAIR = f"{OM}-{RM}"  # in the column of methods: of the difference between the two
@@ -275,20 +274,13 @@ def methods_compared(
         }
         yield Comparison(topic, name, origin, " / ".join(methods), **numbers)
         for (i, j), p in differences.items():
-            numbers = _pair_numbers(table[:, i], table[:, j], post_hoc, (i, j), test.reason)
+            means = described_pair(table[:, i], table[:, j])  # also where no test was possible
+            numbers = vars(post_hoc.get((i, j), means.with_(reason=test.reason)))
+            numbers = (
+                numbers | {name: getattr(means, name) for name in _MEANS} | {"lilliefors_p": p}
+            )
             pair = methods[i], methods[j]
-            numbers["lilliefors_p"] = p
             yield Comparison(topic, f"bonferroni_{after}", origin, *pair, **numbers)
-
-
-def _pair_numbers(
-    x: Sample, y: Sample, post_hoc: PostHoc, place: tuple[int, int], reason: str
-) -> dict[str, Any]:
-    """Of a post hoc test; means also where it was not possible."""
-    means = described_pair(x, y)
-    found = post_hoc.get(place, means.with_(reason=reason))
-    kept = ("n", "mean_a", "sd_a", "mean_b", "sd_b")
-    return vars(found) | {name: getattr(means, name) for name in kept}
 
 
 # --- which test belongs to which table ------------------------------------------------------------
@@ -393,9 +385,9 @@ class PersonTestCounts:
     """What the participants' tests come to; keeps numbers of them, not the tests."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[Topic, str, Origin], array[float]] = defaultdict(
-            lambda: array("d")  # statistic and p, one participant after the other
-        )
+        # statistic and p of each participant
+        self._numbers: dict[tuple[Topic, str, Origin], list[tuple[float, float]]]
+        self._numbers = defaultdict(list)
         self._reasons: dict[tuple[Topic, str, Origin], set[str]] = defaultdict(set)
 
     def add(self, tests: Iterable[PersonTest]) -> None:
@@ -405,7 +397,7 @@ class PersonTestCounts:
                 ("fisher_z", "published", test.fisher),
             ):
                 key: Any = (test.topic, name, origin)
-                self._numbers[key].extend((found.statistic, found.p_value))
+                self._numbers[key].append((found.statistic, found.p_value))
                 self._reasons[key] |= {found.reason} if found.reason else set()
 
     def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
@@ -413,7 +405,7 @@ class PersonTestCounts:
         return tuple(Comparison(*key, OM, RM, **self._of(key, alpha)) for key in self._numbers)
 
     def _of(self, key: tuple[Topic, str, Origin], alpha: float) -> dict[str, Any]:
-        numbers, reasons = np.reshape(self._numbers[key], (-1, 2)), self._reasons[key]
+        numbers, reasons = np.array(self._numbers[key]), self._reasons[key]
         total = len(numbers)
         t, p = numbers[~np.isnan(numbers[:, 1])].T
         better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))

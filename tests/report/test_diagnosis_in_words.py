@@ -16,7 +16,7 @@ from bsip_cli.report.effect_words import (
     size_words,
 )
 from bsip_cli.report.errors import budget_sentences, found_share, overall_pieces, pieces
-from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
+from bsip_cli.report.participant.document import limit_blocks, nearest
 from bsip_cli.report.verdict import (
     cause_line,
     cause_text,

@@ -100,7 +100,21 @@ def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]
     plain = named[1] or [trial for trial in free if not unit.loads(trial)]
     for option, trials in zip(_OPTIONS, (heavy, plain), strict=True):
         _check_set(unit, option, trials, ready)
-    _check_apart(unit, heavy, plain)
+    twice = [trial.stem for trial in heavy if trial in plain]
+    if twice:
+        raise UsageError(
+            f"{listed(twice)} in --with and in --without",
+            file=unit.name,
+            expected="every recording in one of them",
+            remedy="name recordings as in squat_run-2 where a task has both",
+        )
+    if _carried(unit, heavy[0]) == _carried(unit, plain[0]):
+        raise UsageError(
+            f"{heavy[0].stem} and {plain[0].stem} carry the same declared load, or none",
+            file=unit.name,
+            expected="a load in [[loads]] of study.toml that is carried in one set only",
+            remedy="declare it, with `tasks` or `runs` of the recordings that carry it",
+        )
     return heavy, plain
 
 
@@ -145,25 +159,6 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
             file=unit.name,
             expected="the same in all recordings of a set",
             remedy=f"name those of one load with {option}",
-        )
-
-
-def _check_apart(unit: Unit, heavy: list[Trial], plain: list[Trial]) -> None:
-    """No recording is in both sets, and a declared load distinguishes them."""
-    twice = [trial.stem for trial in heavy if trial in plain]
-    if twice:
-        raise UsageError(
-            f"{listed(twice)} in --with and in --without",
-            file=unit.name,
-            expected="every recording in one of them",
-            remedy="name recordings as in squat_run-2 where a task has both",
-        )
-    if _carried(unit, heavy[0]) == _carried(unit, plain[0]):
-        raise UsageError(
-            f"{heavy[0].stem} and {plain[0].stem} carry the same declared load, or none",
-            file=unit.name,
-            expected="a load in [[loads]] of study.toml that is carried in one set only",
-            remedy="declare it, with `tasks` or `runs` of the recordings that carry it",
         )
 
 

@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from bsip_cli.errors import printable
 from bsip_cli.report.cause_colours import Piece, fills
+from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -213,9 +214,6 @@ class Document:
         for section in self.sections:
             yield from section.blocks
 
-    def pictures(self) -> Iterator[Picture]:
-        yield from (block for block in self.blocks() if isinstance(block, Picture))
-
 
 # --- a document as one self-contained HTML page ---------------------------------------------------
 
@@ -254,20 +252,5 @@ def _tied(text: str) -> str:
     return re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
 
 
-_GLOSSARY = (
-    ("COP", "Centre of pressure: where on the plate the ground force acts."),
-    ("RM", "Regression method: segment parameters from an anthropometric table."),
-    ("RM+mass", "RM, all masses and tensors times one number, so that the plates' weight fits."),
-    ("OM", "Optimisation method: parameters identified from this person's movement and forces."),
-    ("OM+causes", "OM identified again with every named fault in the model."),
-    ("Segment parameters", "Mass, centre of mass and moments of inertia of a body segment."),
-    ("Data decide", "Part of the table's uncertainty that the recordings removed; 0: the table."),
-    ("Error budget", "What makes the squared difference of simulated and measured forces."),
-    ("Held out", "Data that identified nothing, on which methods are compared."),
-    ("Probability", "That a fault is there, given all else that was found."),
-    ("95 % interval", "Holds the true value in 95 of 100 such recordings."),
-    ("sd", "Standard deviation."),
-    ("BW", "Body weight."),
-)
-WORDS = Section("words", "What do the words mean?", (Terms(_GLOSSARY),))
-"""The glossary of every report."""
+# The glossary of every report.
+WORDS = Section("words", "What do the words mean?", (Terms(tuple(TEXTS["glossary"].items())),))

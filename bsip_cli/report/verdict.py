@@ -81,11 +81,6 @@ class Verdict:
     advice: tuple[str, ...]
     limits: str
 
-    def paragraphs(self) -> tuple[str, ...]:
-        """Everything, in order."""
-        limits = (self.limits,) if self.limits else ()
-        return (self.headline, *self.causes, *self.results, *self.advice, *limits)
-
 
 def verdict_of(
     diagnosis: pd.DataFrame,

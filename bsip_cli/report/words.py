@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 MISSING = "–"
 EXTENDED = f"{OM}+causes"  # how reports call OM with every named cause in the model
 METHODS = {
@@ -140,9 +143,7 @@ def true_minus(text: str) -> str:
     return re.sub(r"(?<![\w.)])-(?=\d)", "−", text)
 
 
-def segment_label(segment: str) -> str:
-    """``left upper arm`` for upper_arm_l."""
-    return in_words(segment)
+segment_label = in_words  # ``left upper arm`` for upper_arm_l
 
 
 def component_label(component: str) -> str:

@@ -106,12 +106,8 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
 
 def plain(text: str, longest: int = LONGEST_LABEL) -> str:
     """A foreign label as it is: no mathematics, nothing unprintable, cut where it is too long."""
-    return literal(text if len(text) <= longest else f"{text[: longest - 1]}…")
-
-
-def literal(text: str) -> str:
-    """A foreign text as it is: no mathematics, nothing unprintable."""
-    return printable(text).replace("$", r"\$")
+    shown = text if len(text) <= longest else f"{text[: longest - 1]}…"
+    return printable(shown).replace("$", r"\$")
 
 
 def thinned(length: int, most: int = MOST_POINTS) -> slice:

@@ -232,7 +232,7 @@ def build_tables(
         absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
         more = (
             *model.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
-            model.missing(absent),
+            f"Missing: {model.named(absent, '; ')}." if absent else "",
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
     return (*tables, *(published.next_to_published(tag, of_table[tag]) for tag in IN_PRINT))

@@ -201,6 +201,7 @@ def texts_of(
     words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
     words["percent"] = f"{criteria.equivalence_percent:g}"
     words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
+    words["star"] = f"* significant: p < {_level(criteria.alpha)}."
     words["holm"] = _holm_legend(tests, criteria.alpha)
     words["normal"] = (
         f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
@@ -212,10 +213,6 @@ def texts_of(
 
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:
     return sign if row.p_value < alpha else ""
-
-
-def star_legend(alpha: float) -> str:
-    return f"* significant: p < {_level(alpha)}."
 
 
 def _holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
@@ -242,15 +239,10 @@ def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ..
                 concerned[row.reason][label] = None
     everyone = set(labels.values())
     return tuple(
-        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else _named([*names])}): "
+        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else named([*names])}): "
         f"{reason}"
         for reason, names in concerned.items()
     )
-
-
-def missing(sentences: Sequence[str]) -> str:
-    """Who is not in the table, and why."""
-    return f"Missing: {_named(sentences, '; ')}." if sentences else ""
 
 
 def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
@@ -272,7 +264,7 @@ def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _named(names: Sequence[str], comma: str = ", ") -> str:
+def named(names: Sequence[str], comma: str = ", ") -> str:
     shown = comma.join(names[:NAMED_AT_MOST])
     more = len(names) - NAMED_AT_MOST
     return f"{shown}{comma}and {more} more" if more > 0 else shown

@@ -134,8 +134,7 @@ def _paired(
         found = results.values(topic, every) | {"reason": results.reasons(topic)} | own
         rows.append(model.Row(found, topic.unit, group, stars(results, topic, criteria)))
     title, legend = model.texts_of(name, results, tests, criteria, **more)
-    star = model.star_legend(criteria.alpha)
-    notes = (star, *legend, *model.not_possible(results, named))
+    notes = (*legend, *model.not_possible(results, named))
     return model.Table(name, title, every, tuple(rows), notes)
 
 

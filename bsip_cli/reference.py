@@ -322,10 +322,7 @@ def _links(kinds: Sequence[str]) -> str:
 
 
 def _schema_parts(
-    schema: Schema,
-    file: str,
-    common: Sequence[Column],
-    shown: dict[tuple[Column, ...], str],
+    schema: Schema, file: str, common: Sequence[Column], shown: dict[tuple[Column, ...], str]
 ) -> list[str]:
     """Heading, the file's KIND if it is another one, and columns; those that an earlier artifact
     has are not repeated."""

@@ -14,16 +14,11 @@ from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
 from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
+from bsip_cli.report.words import COMPONENTS, TEXTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
 
-_IN_WORDS = {
-    OM: "OM (segment parameters identified from this person)",
-    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
-    RM: "RM (segment parameters of an anthropometric table)",
-}
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
 
@@ -122,9 +117,9 @@ def use_sentence(
     the artifacts of these names."""
     use = "Once the large error is gone, use" if is_wrong else "Use"
     if choice is None or choice.empty:
-        return f"{use} {_IN_WORDS[RM]}: nothing was compared."
+        return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
-    said = f"{use} {_IN_WORDS[str(first['use'])]}{_compared(first)}."
+    said = f"{use} {TEXTS['methods_in_full'][str(first['use'])]}{_compared(first)}."
     others = [
         f"For {listing(list(rows['movement']))} use {method}: OM is "
         f"{'' if method == OM else 'not '}clearly better there."
@@ -273,16 +268,6 @@ UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
 _LAST = ("noise", UNKNOWN)
-_WORDS = {
-    "inertial_parameters": PARAMETERS,
-    "joint_centres": "joint centres",
-    "marker_places": "places of the markers",
-    "soft_tissue": "soft tissue",
-    "trunk_and_shoulders": "trunk and shoulders that bend",
-    "smoothing": "smoothing of the motion",
-    "noise": "noise",
-    "unknown": UNKNOWN,
-}
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
 LEAST_REPORTED_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
@@ -354,7 +339,7 @@ def term_words(term: str) -> str:
     """A term of the budget in words."""
     if term.startswith(_FAULT):
         return EFFECT_WORDS[term.removeprefix(_FAULT)].title
-    return _WORDS[term]
+    return str(TEXTS["terms"][term])
 
 
 def _label(term: str, found: Collection[str]) -> str:

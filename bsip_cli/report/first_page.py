@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bsip_cli.report import blocks, verdict
-from bsip_cli.report.candidates import (
-    OF_THE_WEIGHT,
-    analysed,
-    effects_in,
-    is_large,
-)
+from bsip_cli.report.candidates import OF_THE_WEIGHT, analysed, effects_in, is_large
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
@@ -29,7 +24,7 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, abbreviations, capital, count, listing, number
+from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -38,12 +33,6 @@ _SEXES = {"M": "man", "F": "woman"}
 _MOST = 2  # causes, and things to do
 _POSES = 8  # among which the one is chosen that is shown
 _SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
-_USABLE = {
-    "fine": "The data may be used: nothing needs to be corrected.",
-    "cause": "The data may be used once what was found is corrected or stated.",
-    "large": "Use no results while the error is so large.",
-    "inconclusive": "Whether the data may be used cannot be said.",
-}
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
@@ -181,8 +170,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
         yield blocks.Bar(
-            "What makes the squared error of the forces with a table's parameters (RM)",
-            pieces,
+            "What makes the squared error of the forces with a table's parameters (RM)", pieces
         )
 
 
@@ -204,7 +192,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """Whether the data may be used, and at most two things to do."""
     causes = record.causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
-    said = [_USABLE[light.state], *said]
+    said = [TEXTS["usable"][light.state], *said]
     said += verdict.consequences(causes[:_MOST], only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
     for k, cause in groups[:1]:

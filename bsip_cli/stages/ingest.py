@@ -105,9 +105,7 @@ def run(unit: Unit) -> None:
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
-def _without_zero(
-    recording: Recording,
-) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
+def _without_zero(recording: Recording) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
     """The plates without what they read without load, and that, (6,) by plate: N and N m about the
     world's origin."""
     done, rate_hz = [], recording.analog_rate_hz

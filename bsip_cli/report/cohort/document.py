@@ -43,6 +43,7 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import (
     MISSING,
+    TEXTS,
     abbreviations,
     capital,
     component_label,
@@ -378,12 +379,7 @@ def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
-_STATES: dict[State, str] = {  # the worst first
-    "large": "with a large error",
-    "cause": "with something found but no large error",
-    "inconclusive": "inconclusive",
-    "fine": "fine",
-}
+_STATES: dict[State, str] = TEXTS["states"]
 _SOME_ARE_WRONG = (
     "The probabilities hold as far as the model of ordinary errors does. Of findings with 95 %, one "
     "in twenty is expected not to be there: among many people some are not."

@@ -31,6 +31,7 @@ from bsip_cli.report.participant import errors
 from bsip_cli.report.words import (
     MISSING,
     ROLES,
+    TEXTS,
     capital,
     count,
     listing,
@@ -43,18 +44,9 @@ from bsip_cli.report.words import (
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
-CANNOT_KNOW = (
-    "A mass behind a spherical joint enters the ground force only together with its neighbour's "
-    "parameters: each mass is an identified combination plus nearness to the table.",
-    "Segments are rigid and joints ideal. Soft tissue, breathing and a bending spine end up in the "
-    "parameters or in what is left.",
-    "An error that is the same in all recordings can hide in the identified parameters.",
-    "Frames are not independent: intervals allow for it.",
-)
-
 
 def participant_document(record: records.ParticipantRecord) -> Document:
-    made = [Heading("What cannot be known"), Bullets(CANNOT_KNOW)]
+    made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",

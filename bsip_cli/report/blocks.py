@@ -186,6 +186,12 @@ class Picture(Block):
         return to_svg(self.figure)
 
 
+def picture(name: str, figure: Figure, data: pd.DataFrame, **words: str) -> Picture:
+    """A figure with its texts of ``texts.toml``, into which ``words`` are put."""
+    texts = {part: text.format(**words) for part, text in TEXTS["pictures"][name].items()}
+    return Picture(figure, name, data=data, **texts)
+
+
 @dataclass(frozen=True, eq=False)
 class Portrait(Picture):
     """A figure that stands at the side of the first page."""

@@ -33,6 +33,7 @@ from bsip_cli.report.effect_words import (
 )
 from bsip_cli.report.words import (
     METHODS,
+    TEXTS,
     capital,
     component_label,
     count,
@@ -54,9 +55,6 @@ _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
-_OF_THE_LABORATORY = (
-    "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
-)
 CAUSE_UNKNOWN = "cause unknown"
 _UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
 _OR_THE_MASS = ", or the stated mass is wrong"
@@ -398,7 +396,11 @@ def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
     known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
-    lab = ((_OF_THE_LABORATORY, ""),) if all(one.scope == "laboratory" for one in cause) else ()
+    lab = (
+        ((TEXTS["of_the_laboratory"], ""),)
+        if all(one.scope == "laboratory" for one in cause)
+        else ()
+    )
     return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 
 

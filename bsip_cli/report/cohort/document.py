@@ -20,10 +20,10 @@ from bsip_cli.report.blocks import (
     Light,
     Links,
     Paragraph,
-    Picture,
     Section,
     State,
     Terms,
+    picture,
 )
 from bsip_cli.report.cohort import laboratory
 from bsip_cli.report.cohort.record import (
@@ -156,17 +156,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
     if not any(np.isfinite(strip.values).any() for strip in drawn):
         yield Paragraph("No errors are known.", "warning")
         return
-    yield Picture(
-        strips(drawn),
-        "yardsticks",
-        "A dot per person, with the parameters to use; the line is the median. COP: centre of "
-        "pressure. Blue: as good as published (Hansen 2017, table 4; markers: quiet stance). Red: "
-        "large (Hicks 2015; OpenSim's checklist). Triangles: beyond the axis, with the number.",
-        "Strips of dots: errors per person.",
-        "low and close together is good. All high: the laboratory. One high: that person.",
-        "read the laboratory's part below, or the report of who lies far out.",
-        pd.DataFrame(rows),
-    )
+    yield picture("yardsticks", strips(drawn), pd.DataFrame(rows))
     linked = tuple((words, member.link()) for words, member in far_out if member.link())
     if linked:
         yield Links("Far from the others, or large:", linked[: 2 * _MOST])
@@ -321,17 +311,8 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
     of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
     where = "held-out data" if ratios.held_out else "the data that identified the parameters"
     data = pd.concat(table.assign(component=name) for name, table in ratios.of_component.items())
-    yield Picture(
-        gain_dots([component_label(name) for name in names], of_method),
-        "gain",
-        f"Error of RM+mass and of OM over error of RM, on {where}; a dot per participant, the bar "
-        "their geometric mean.",
-        "Dots: error ratios per component.",
-        "left of 1 follows better. What RM+mass gains is one number's doing, no gain of "
-        "identification.",
-        "use OM only where its dots lie left of those of RM+mass.",
-        data.reset_index(),
-    )
+    figure = gain_dots([component_label(name) for name in names], of_method)
+    yield picture("gain", figure, data.reset_index(), where=where)
     yield Grid(
         ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
         tuple(_row(name, ratios) for name in names),
@@ -380,10 +361,6 @@ def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
 _STATES: dict[State, str] = TEXTS["states"]
-_SOME_ARE_WRONG = (
-    "The probabilities hold as far as the model of ordinary errors does. Of findings with 95 %, one "
-    "in twenty is expected not to be there: among many people some are not."
-)
 
 
 def light_of_all(record: CohortRecord) -> Light:
@@ -425,7 +402,7 @@ def diagnoses_section(record: CohortRecord) -> Section:
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
     if rows:
-        blocks.append(Paragraph(_SOME_ARE_WRONG, "note"))
+        blocks.append(Paragraph(TEXTS["some_are_wrong"], "note"))
     return Section("diagnoses", "What is wrong in the recordings", tuple(blocks))
 
 

@@ -15,7 +15,7 @@ from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table
-from bsip_cli.report.words import COMPONENTS, capital, listing, number, task_of
+from bsip_cli.report.words import COMPONENTS, TEXTS, capital, listing, number, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
@@ -127,10 +127,7 @@ class CohortRecord:
 # --- causes that several people's recordings share ------------------------------------------------
 
 
-SHARED = (
-    "Shared causes may point to the laboratory, the task or the model rather than to a person "
-    "(a few of very many may be coincidence):"
-)
+SHARED = TEXTS["shared_causes"]
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same

@@ -20,8 +20,8 @@ from bsip_cli.report.blocks import (
     Heading,
     Numbered,
     Paragraph,
-    Picture,
     Section,
+    picture,
 )
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.errors import MARKERS, yardsticks
@@ -175,16 +175,12 @@ def _markers(record: records.ParticipantRecord) -> Iterator[Block]:
     limit = next(y.limit for y in yardsticks(np.nan, np.nan) if y.name == MARKERS)
     far = [f"{name} ({number(rms[name], 0)} mm)" for name in rms.index[rms > limit]]
     yield Heading("Markers")
-    yield Picture(
-        marker_bars([str(name) for name in rms.index], rms.to_numpy(), limit),
+    yield picture(
         "marker_residuals",
-        "Root mean square distance of each marker from its model, all recordings; the line is the "
-        f"limit of {number(limit, 0)} mm.",
-        "Bars: distance per marker.",
-        "low and even is good. One far above the others has slipped, is exchanged with another, or "
-        "sits where the model does not expect it.",
-        f"look at {listing(far)}." if far else "nothing: none is beyond the limit.",
+        marker_bars([str(name) for name in rms.index], rms.to_numpy(), limit),
         rms.rename("rms_mm").reset_index(),
+        limit=number(limit, 0),
+        action=f"look at {listing(far)}" if far else "nothing: none is beyond the limit",
     )
 
 
@@ -275,16 +271,8 @@ def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
         dtype=float,
     )
     labelled = shown.rename(index=segment_label)
-    yield Picture(
-        segment_masses(labelled),
-        "masses",
-        "Segment masses by table (RM), by the table times one number (RM+mass) and identified (OM), "
-        "their difference, and how much of each the data decide.",
-        "Points: segment masses; bars: how much the data decide.",
-        "long bars to the right are good: the number is this person's. Short ones: it is the table's.",
-        "do not read a difference into a mass that the data hardly decide.",
-        shown.rename_axis("segment").reset_index(),
-    )
+    numbers = shown.rename_axis("segment").reset_index()
+    yield picture("masses", segment_masses(labelled), numbers)
     shift_mm = 1e3 * np.linalg.norm(om[_COM].to_numpy() - rm[_COM].to_numpy(), axis=1)
     rows = [
         (
@@ -361,13 +349,7 @@ def diagnosis_section(record: records.ParticipantRecord) -> Section:
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),
         Heading("How this was decided"),
-        Paragraph(
-            "One statistical model explains the difference between measured and simulated forces by "
-            "noise, by ordinary errors of ordinary size (parameters, joint centres, markers, "
-            "smoothing) and by faults of a catalogue, which join one after the other while one more "
-            f"is more probable than none. A single name is said from {named_from} % on, else the "
-            "smallest group that holds as much."
-        ),
+        Paragraph(TEXTS["how_decided"].format(named_from=named_from)),
     )
     return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
 
@@ -390,11 +372,7 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
         for one in rejected
     )
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
-    caption = (
-        "Changes: root mean square in the force or moment that changes most. Explains: of the "
-        "squared difference in seconds that did not size it, with 95 % interval."
-    )
-    return (Grid(head, rows, caption),)
+    return (Grid(head, rows, TEXTS["captions"]["nearest"]),)
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -410,10 +388,7 @@ def limit_blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[Bloc
         row for effect in effect_words.USUAL for row in _limit_rows(effect, together, alone)
     )
     head = ("fault", "in all recordings", "in one alone", "usual in laboratories")
-    caption = (
-        "Least size that would be named in 95 of 100 such recordings, from the best place and "
-        "recording to the worst. Good: below what is usual. Above: a usual fault may be there."
-    )
+    caption = TEXTS["captions"]["limits"]
     return (*_never_seen(detection, diagnosis), Grid(head, rows, caption, words=4))
 
 

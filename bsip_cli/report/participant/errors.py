@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report import errors
-from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
+from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section, picture
 from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
@@ -53,17 +53,9 @@ def _over_time(record: ParticipantRecord) -> Iterator[Block]:
         data |= {f"{column}_{m}": v / scale for m, v in shown.items()}
     seen = flags_of(trial.reconstruction, "used")[window].any()
     fitted = "used to identify, which favours OM" if seen else "not used to identify"
-    yield Picture(
-        curves(panels, 1),
-        "forces",
-        f"{trial.label}: measured (grey) and simulated ground force and centre of pressure (COP), "
-        f"{clock[0]:.1f} to {clock[-1]:.1f} s; data {fitted}.",
-        "Curves over time: measured and simulated.",
-        "the coloured lines should lie on the grey one. A constant distance is a shifted plate or a "
-        "wrong mass, a lag is a delay, spikes at contact are smoothing or soft tissue.",
-        "where they part, look at the recording at that second.",
-        pd.DataFrame(data),
-    )
+    words = {"start": f"{clock[0]:.1f}", "end": f"{clock[-1]:.1f}", "fitted": fitted}
+    numbers = pd.DataFrame(data)
+    yield picture("forces", curves(panels, 1), numbers, trial=trial.label, **words)
 
 
 def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
@@ -100,18 +92,8 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
-        yield Picture(
-            error_bars(bars, errors.overall_pieces(record.budget, found)),
-            "error_budget",
-            "What makes the error of the table's parameters (RM) in each component, and how large it "
-            "is, over all recordings.",
-            "Bars: shares of the squared error by cause.",
-            "little that is hatched (unknown) is good. What stands left of zero makes the error "
-            "smaller where it is.",
-            "a long bar of segment parameters: use OM. A long hatched bar in a large error: something "
-            "is wrong that has no name here.",
-            record.budget[record.budget["trial"] == ""],
-        )
+        figure = error_bars(bars, errors.overall_pieces(record.budget, found))
+        yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])
 
 
 # --- in figures ---------------------------------------------------------------------------------
@@ -253,16 +235,8 @@ def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
     axes = {joint: _axis(rows, joint) for joint in joints}
     data = rows[rows["method"].isin(methods) & (rows["axis"] == rows["joint"].map(axes))]
     columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
-    return Picture(
-        curves(panels, 2, 32.0),
-        "joint_moments",
-        f"{trial.label}: moments with the table's parameters (RM) and identified ones (OM), "
-        "with 95 % bands of OM.",
-        "Curves: joint moments over time.",
-        "lines inside one another's band differ by less than can be known.",
-        f"where RM leaves the band, report moments of {use}.",
-        data[columns],
-    )
+    figure = curves(panels, 2, 32.0)
+    return picture("joint_moments", figure, data[columns], trial=trial.label, use=use)
 
 
 def _axis(rows: pd.DataFrame, joint: str) -> str:

@@ -190,14 +190,14 @@ def participants(rows: Iterable[Comparison]) -> str:
     return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
 
 
-_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
 def texts_of(
     name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
 ) -> tuple[str, tuple[str, ...]]:
     """Title and legend of a table; ``more``: what only this one says."""
-    words = _TEXTS["shared"] | more
+    words = TEXTS["shared"] | more
     words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
     words["percent"] = f"{criteria.equivalence_percent:g}"
     words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
@@ -207,8 +207,8 @@ def texts_of(
         f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
         "Wilcoxon's test is the one to read."
     )
-    notes = (note.format(**words) for note in _TEXTS[name]["notes"])
-    return _TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
+    notes = (note.format(**words) for note in TEXTS[name]["notes"])
+    return TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
 
 
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:

@@ -101,14 +101,7 @@ def task_label(topic: Topic) -> str:
 # --- the tables ---------------------------------------------------------------------------------
 
 _AXES = {"cop_ap": "AP", "cop_ml": "ML"}
-_QUANTITIES = {
-    "cop_error": "COP error",
-    "grf_vertical": "Vertical GRF",
-    "cop_ap": "COP error AP",
-    "cop_ml": "COP error ML",
-}
-"""Groups of rows of table 4; the first two as in print."""
-
+_QUANTITIES: dict[str, str] = model.TEXTS["quantities"]
 _RESIDUALS = {"force_residual": "force", "moment_residual": "moment"}
 _OVER_SEGMENTS = {"mean": "mean", "median": "median", "max": "largest"}
 _COM = "com_"

@@ -19,7 +19,7 @@ from bsip_cli.identification.prior import Prior
 from bsip_cli.identification.problem import Problem
 from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.formats import to_markdown
-from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.model import TEXTS, Column, Row, Table
 from bsip_cli.report.words import listing, number, segment_label
 from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
@@ -182,12 +182,9 @@ def _tables(unit: Unit) -> Iterator[Table]:
             (*_FIRST, _DIFFERENCE, _DECLARED),
             tuple(map(_row, loaded.to_dict("records"))),
             (
-                "Difference: with less without, and its 95 % interval. m: mass; mc: first moment "
-                "and I: inertia about the segment's joint; c: centre of what was added, from the "
-                "segment's origin, in the segment's frame (X anterior, Y up, Z right).",
+                TEXTS["compare_loads"]["difference"],
                 *(  # where a load cannot be distinguished from none
-                    f"On the {segment_label(segment)} these recordings show no load: the mass may "
-                    "be zero. Longer ones that move the segment more have narrower intervals."
+                    TEXTS["compare_loads"]["none"].format(segment=segment_label(segment))
                     for segment in loaded[(loaded["quantity"] == "m") & may_be_none]["segment"]
                 ),
             ),
@@ -199,8 +196,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
         (*_FIRST, _DIFFERENCE, _DECLARED, _EXPECTED),
         tuple(map(_row, masses.to_dict("records"))),
         (
-            "To be expected: the forces hardly show how segments that a joint connects share a "
-            "mass; so much of the declared load should be found, within the interval.",
+            TEXTS["compare_loads"]["expected"],
             f"First moments and tensors of all segments: {unit.path('load-comparison')}",
         ),
     )

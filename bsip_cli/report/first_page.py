@@ -202,9 +202,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         said.append(f"To learn the cause of finding {k}, {step}.")
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
-        said.append(
-            "Record a movement in which every foot that touches the ground stands on a plate."
-        )
+        said.append(TEXTS["to_do"]["contacts"])
     said += [text for one in large[:1] if (text := _where_large(record, one))]
     if len(said) == 1 and len(rows := record.excitation.query("quantity == 'next'")):
         text = rows["text"].iloc[0]
@@ -215,16 +213,11 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
 def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
     """Where to look for what makes an error large; empty where no recording has it."""
     if yardstick.name == MARKERS:
-        return (
-            "Check that marker set and labels are right: the markers do not fit the body (below)."
-        )
+        return str(TEXTS["to_do"]["markers"])
     fits = {t.label: t.fit for t in record.moving_trials() if t.fit is not None}
     sizes = {label: errors_of([fit], record.use())[yardstick.name] for label, fit in fits.items()}
     known = {label: size for label, size in sizes.items() if np.isfinite(size)}
     if not known:
         return ""
     worst = max(known, key=known.__getitem__)
-    return (
-        f"Look at {worst}, where the {yardstick.in_sentence()} is largest: a foot beside the "
-        "plate, a hand on something, plates or markers out of place, forces that start late?"
-    )
+    return str(TEXTS["to_do"]["forces"]).format(trial=worst, error=yardstick.in_sentence())

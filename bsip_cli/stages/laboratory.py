@@ -147,11 +147,10 @@ def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
     """Sessions whose plates have the same names and places, the most first."""
     found: list[list[_Session]] = []
     for one in sessions:
-        mine = [lab for lab in found if _alike(lab[0].plates, one.plates)]
-        if mine:
-            mine[0].append(one)
-        else:
-            found.append([one])
+        mine = next((lab for lab in found if _alike(lab[0].plates, one.plates)), None)
+        if mine is None:
+            found.append(mine := [])
+        mine.append(one)
     return sorted(found, key=len, reverse=True)
 
 

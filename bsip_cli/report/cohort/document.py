@@ -290,11 +290,7 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         yield Paragraph("No trial could be compared with both methods.", "warning")
         return
     if not ratios.held_out:
-        yield Paragraph(
-            "Nobody has held-out data: these numbers are from the data that identified the "
-            "parameters, and favour OM.",
-            "warning",
-        )
+        yield Paragraph(TEXTS["nobody_held_out"], "warning")
     worse = []
     for name in names:
         over = ratios.over_best_other(name)

@@ -91,13 +91,8 @@ def _trials(record: records.ParticipantRecord) -> Grid:
         "pose known [%]",
         "markers [mm]",
     )
-    return Grid(
-        head,
-        tuple(_trial_row(trial) for trial in record.trials),
-        "Forces are compared while every foot on the ground stands on a plate. Markers: root mean "
-        "square distance from the model.",
-        words=2,
-    )
+    rows = tuple(_trial_row(trial) for trial in record.trials)
+    return Grid(head, rows, TEXTS["captions"]["trials"], words=2)
 
 
 def _trial_row(trial: records.TrialRecord) -> tuple[str | Cell, ...]:
@@ -127,10 +122,7 @@ def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
         trials_of.setdefault(words, []).append(trial)
     if trials_of:
         carried = "; ".join(f"{words} in {listing(trials)}" for words, trials in trials_of.items())
-        yield Paragraph(
-            f"Known loads, as study.toml states them: {carried}. They are no part of the masses: "
-            "their share of the ground forces was computed as of point masses."
-        )
+        yield Paragraph(TEXTS["loads"].format(carried=carried))
 
 
 def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
@@ -225,20 +217,12 @@ def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
             "warning",
         )
     if choice["trials"].iloc[0]:
-        yield Grid(
-            ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings"),
-            tuple(
-                (
-                    row["movement"],
-                    row["use"],
-                    *(_ratio(row, x) for x in _RATIOS),
-                    str(row["trials"]),
-                )
-                for row in choice.to_dict("records")
-            ),
-            "Errors as ratios (below 1: smaller), with one standard error to either side.",
-            words=2,
+        head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
+        rows = tuple(
+            (one["movement"], one["use"], *(_ratio(one, x) for x in _RATIOS), str(one["trials"]))
+            for one in choice.to_dict("records")
         )
+        yield Grid(head, rows, TEXTS["captions"]["choice"], words=2)
 
 
 def _ratio(row: Mapping, name: str) -> str:

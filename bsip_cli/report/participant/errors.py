@@ -15,7 +15,15 @@ from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
-from bsip_cli.report.words import COMPONENTS, EXTENDED, component_label, count, number, signed
+from bsip_cli.report.words import (
+    COMPONENTS,
+    EXTENDED,
+    TEXTS,
+    component_label,
+    count,
+    number,
+    signed,
+)
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN, is_extended
 from bsip_cli.statistics.samples import Z95
@@ -107,11 +115,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph("No recording could be compared with both methods.", "warning")
         return
     if not any(gain.held_out for gain in gains):
-        yield Paragraph(
-            "No data were held out: these errors are of the very data that identified the "
-            "parameters, and favour OM.",
-            "warning",
-        )
+        yield Paragraph(TEXTS["nothing_held_out"], "warning")
     yield from _one_number(record, gains)
     by_trial: dict[str, dict[str, errors.Gain]] = {}
     for gain in known:
@@ -184,10 +188,7 @@ def _blocks(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph("In no recording are the moments of a hip, knee, ankle, shoulder or elbow "
                         f"determined. {_left_out(trials[0])}", "warning")  # fmt: skip
         return
-    yield Paragraph(
-        "Net moments of all structures across a joint, by the proximal on the distal segment, "
-        "from the forces under each foot. Legs are left out while both feet share a plate."
-    )
+    yield Paragraph(TEXTS["net_moments"])
     yield _picture(trial, joints, record.use())
     for said in largest_changes(all_peaks(trials)):
         yield Paragraph(f"{said}.")

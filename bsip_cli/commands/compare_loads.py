@@ -211,11 +211,8 @@ def _row(values: dict) -> Row:
     return Row({"segment": name, "quantity": values["quantity"], "unit": unit, **cells})
 
 
-_FIRST = (
-    Column(("segment",), "Segment", text=True),
-    Column(("quantity",), "Quantity", text=True),
-    Column(("unit",), "Unit", text=True),
-)
+_NAMES = ("segment", "quantity", "unit")
+_FIRST = tuple(Column((name,), name.capitalize(), text=True) for name in _NAMES)
 _DIFFERENCE = Column(("difference", "ci_low", "ci_high"), "Difference", "{} ({} to {})".format)
 _DECLARED = Column(("declared",), "Declared")
 _EXPECTED = Column(("expected",), "To be expected")

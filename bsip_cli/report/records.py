@@ -124,9 +124,6 @@ class ParticipantRecord:
         return float((ran or [self.defaults[section]])[0][name])
 
 
-Message = tuple[str, str, str]  # stage, unit, text
-
-
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
     """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
     names = [name for name in table["method"].unique() if is_extended(name)]
@@ -174,13 +171,13 @@ _MOST_WARNINGS = 6
 class HowMade:
     """What made many artifacts, without what they share again and again.
 
-    options, versions : name -> all values; files : recordings and the like, name -> SHA-256.
+    messages : stage, unit and text. options, versions : name -> all values; files : recordings and the like, name -> SHA-256.
     """
 
     options: dict[str, set[str]] = field(default_factory=dict)
     versions: dict[str, set[str]] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
-    messages: dict[Message, None] = field(default_factory=dict)
+    messages: dict[tuple[str, str, str], None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, origins: Iterable[Origin]) -> HowMade:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
@@ -232,7 +233,7 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     for k, (one, place) in enumerate(zip(cause, own, strict=True)):
         words = probability_words(one.probability)
         probability = f", probability {words}" if words else ""
-        members.append(f"({_letter(k)}) {one.in_words()}{place}{probability}")
+        members.append(f"({ascii_lowercase[k]}) {one.in_words()}{place}{probability}")
     steps = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         steps = f"weigh the person on a scale; {steps}"
@@ -240,10 +241,6 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
         f"{sure}{' ' if sure else ''}To distinguish them: {steps}."
     )
-
-
-def _letter(number: int) -> str:
-    return chr(ord("a") + number)
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
@@ -274,7 +271,7 @@ def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str
         return ""
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
-    which = f"({_letter(position)}) " if len(cause) > 1 else ""
+    which = f"({ascii_lowercase[position]}) " if len(cause) > 1 else ""
     perhaps = "" if low > 0 else ": too few seconds to be sure"
     return (
         f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared difference in "

@@ -224,14 +224,11 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
 
 
 def _left_out(task: _Task, left_out: Mapping[str, str]) -> Iterator[Outcome]:
-    reasons: dict[str, list[str]] = {}
-    for name, why in left_out.items():
-        reasons.setdefault(why, []).append(name)
-    for why, names in reasons.items():
+    stage, code = task.stages[0].name, errors.BadDataError.exit_code
+    for why in dict.fromkeys(left_out.values()):
+        names = [name for name, its_own in left_out.items() if its_own == why]
         said = f"{listed(names)}: left out of the group, since {why}; run `bsip run` first"
-        yield Outcome(
-            task.stages[0].name, "group", "refused", (said,), errors.BadDataError.exit_code
-        )
+        yield Outcome(stage, "group", "refused", (said,), code)
 
 
 def _forget_gone_recordings(folder: Path, participant: Participant) -> None:

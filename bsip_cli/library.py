@@ -14,7 +14,7 @@ Tables are those of the artifacts: docs/artifacts.md lists their columns, units 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
@@ -45,15 +45,12 @@ from bsip_cli.study.trials import Trial, trial_named
 
 _NOWHERE = Path("memory")
 _ID = "sub-01"
-Key = tuple[str, str]  # kind of table; trial, or nothing where it is of the person
 
 
 @dataclass(frozen=True, eq=False)
 class Plate:
     """What a force plate measured, on the body that stands on it.
 
-    Attributes
-    ----------
     force_N, moment_Nm : (n, 3) in the world's axes (Z up), moments about the world's origin; a
         person who stands gives a positive Z. NaN where a sample cannot be used.
     corners_m : (4, 3) of the surface, in order round it, world.
@@ -67,10 +64,7 @@ class Plate:
 def read(path: str | Path) -> Opened:
     """A recording's file: a ``.c3d``, or a ``.trc`` with the file of ground forces next to it.
 
-    Raises
-    ------
-    BadDataError
-        The file is none of these, or is damaged; the sentence says what was found.
+    BadDataError: The file is none of these, or is damaged; the sentence says what was found.
     """
     return open_recording(Path(path))
 
@@ -84,16 +78,11 @@ def recording(
 ) -> Opened:
     """A recording from arrays.
 
-    Parameters
-    ----------
     labels : of m markers.
     markers_m : (n, m, 3), world (Z up); NaN where a marker is not seen.
     rate_hz : of the markers. analog_rate_hz : of the plates, a multiple of it; by default the same.
 
-    Raises
-    ------
-    UsageError
-        Shapes or rates do not fit together.
+    UsageError: Shapes or rates do not fit together.
     """
     analog_rate_hz = analog_rate_hz or rate_hz
     markers_m = np.asarray(markers_m, dtype=float)
@@ -149,23 +138,16 @@ def _source(name: str, plate: Plate, count: int) -> C3dPlate:
 class Person:
     """A person, the recordings, and what the stages make of them.
 
-    Parameters
-    ----------
     trials : recordings by name: a task, with ``_run-2`` where it was done again ("walking_run-2").
         ``static`` calibrates, ``sequence`` identifies, as ``options["roles"]`` says.
     sex : "M", "F" or "other" (the mean of both tables).
     mass_kg, height_m : None where not known: then from the recordings, where they decide it.
     options : as in study.toml, for example ``{"marker_set": "hansen2017"}``.
 
-    Attributes
-    ----------
     messages : what the stages had to say, in order.
     refused : by stage and trial (empty: the person), why it could not be done.
 
-    Raises
-    ------
-    UsageError
-        Unknown options, or a name that is none of a trial.
+    UsageError: Unknown options, or a name that is none of a trial.
     """
 
     def __init__(
@@ -183,7 +165,7 @@ class Person:
         self.messages: list[str] = []
         self.refused: dict[tuple[str, str], BsipError] = {}
         self._done: set[str] = set()
-        self._kept: dict[Key, _Kept] = {}
+        self._kept: dict[Path, _Kept] = {}
         roles = self.config.roles.model_dump()
         named = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
         self._recordings = {named[name].stem: opened for name, opened in trials.items()}
@@ -245,13 +227,12 @@ class Person:
     def table(self, kind: str, trial: str = "") -> pd.DataFrame:
         """Any table that has been made, by its kind and trial, as docs/artifacts.md names it.
 
-        Raises
-        ------
-        KeyError
-            It has not been made.
+        KeyError: It has not been made.
         """
         stems = {name: stem for stem, name in self._names.items()}
-        return self._kept[kind, stems[trial] if trial else ""].frame.copy()
+        stem = stems[trial] if trial else ""
+        own = next((one for one in self._participant.trials if one.stem == stem), None)
+        return self._kept[self._unit(producer(kind)).path(kind, own)].frame.copy()
 
     # --- running them -------------------------------------------------------------------------
 
@@ -267,10 +248,7 @@ class Person:
     def _run(self, last: str) -> None:
         """What a stage needs, and itself, once; a trial that is refused does not stop the others.
 
-        Raises
-        ------
-        BsipError
-            The person cannot be done.
+        BsipError: The person cannot be done.
         """
         for stage in _needed(last):
             if stage.label in self._done:
@@ -328,22 +306,12 @@ class _Kept:
 
 @dataclass
 class _InMemory(Unit):
-    """A unit whose tables stay in memory."""
+    """A unit whose tables stay in memory, by the paths that they would have."""
 
-    kept: dict[Key, _Kept] = field(default_factory=dict)
+    kept: dict[Path, _Kept] = field(default_factory=dict)
 
-    def _key(self, kind: str, trial: Trial | None = None) -> Key:
-        owner = trial or self.trial
-        return kind, owner.stem if producer(kind).level == "trial" and owner else ""
-
-    def stands(
-        self,
-        kind: str,
-        trial: Trial | None,
-        participant: Participant | None,
-        names: Collection[str] | None = None,
-    ) -> bool:
-        return self._key(kind, trial) in self.kept
+    def _names(self, participant: Participant | None) -> frozenset[str]:
+        return frozenset(path.name for path in self.kept)
 
     def read(
         self,
@@ -352,7 +320,7 @@ class _InMemory(Unit):
         participant: Participant | None = None,
         **wanted: Collection[str],
     ) -> pd.DataFrame:
-        frame = self.kept[self._key(kind, trial)].frame
+        frame = self.kept[self.path(kind, trial, participant)].frame
         for column, values in wanted.items():
             frame = frame[frame[column].isin(list(values))]
         return frame.reset_index(drop=True)
@@ -360,19 +328,14 @@ class _InMemory(Unit):
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> dict:
-        return self.kept[self._key(kind, trial)].facts
+        return self.kept[self.path(kind, trial, participant)].facts
 
     def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
         plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
-        self.kept[self._key(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
-
-    def write_in_parts(
-        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
-    ) -> None:
-        self.write(kind, pd.concat(list(parts), ignore_index=True), facts())
+        self.kept[self.path(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:
-        before = self.kept[self._key(kind)]
+        before = self.kept[self.path(kind)]
         made = before.frame.iloc[: before.rows_made]
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        self.kept[self._key(kind)] = replace(before, frame=as_read(kind, whole))
+        self.kept[self.path(kind)] = replace(before, frame=as_read(kind, whole))

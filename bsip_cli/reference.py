@@ -94,7 +94,10 @@ def cli_page() -> str:
     for (pieces, *options), names in groups.items():
         own = [line for line in options if line not in common]
         shared = [_name(line) for line in options if line in common]
-        parts += [f"## {', '.join(names)} {pieces.replace('[OPTIONS] ', '')}", *_meanings(names)]
+        said_of = {name: _paragraphs(cli.commands[name]) for name in names}
+        alone = said_of[names[0]] if len(names) == 1 else ""
+        meaning = alone or "\n".join(f"- {name}: {text}" for name, text in said_of.items())
+        parts += [f"## {', '.join(names)} {pieces.replace('[OPTIONS] ', '')}", meaning]
         parts += ["Options:"] if own and len(names) > 1 else []
         parts += ["\n".join(own)] if own else []
         said = f"{'And' if own else 'Options:'} {_runs(shared, [_name(line) for line in common])}."
@@ -104,13 +107,6 @@ def cli_page() -> str:
 
 def _name(line: str) -> str:
     return line.split("`")[1].split()[0].rstrip(",")
-
-
-def _meanings(names: Sequence[str]) -> list[str]:
-    texts = [_paragraphs(cli.commands[name]) for name in names]
-    if len(names) == 1:
-        return texts
-    return ["\n".join(f"- {name}: {text}" for name, text in zip(names, texts, strict=True))]
 
 
 def _paragraphs(command: click.Command) -> str:
@@ -322,10 +318,7 @@ def _links(kinds: Sequence[str]) -> str:
 
 
 def _schema_parts(
-    schema: Schema,
-    file: str,
-    common: Sequence[Column],
-    shown: dict[tuple[Column, ...], str],
+    schema: Schema, file: str, common: Sequence[Column], shown: dict[tuple[Column, ...], str]
 ) -> list[str]:
     """Heading, the file's KIND if it is another one, and columns; those that an earlier artifact
     has are not repeated."""

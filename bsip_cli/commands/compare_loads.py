@@ -19,20 +19,14 @@ from bsip_cli.identification.prior import Prior
 from bsip_cli.identification.problem import Problem
 from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.formats import to_markdown
-from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.model import TEXTS, Column, Row, Table
 from bsip_cli.report.words import listing, number, segment_label
 from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
+from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import load_phi, loads_record, person_of
-from bsip_cli.stages.identification_problem import (
-    duration_s,
-    estimate_by,
-    prior_from,
-    problem_of,
-    recordings_of,
-)
 from bsip_cli.study.study import Trial
 from bsip_cli.study.trials import listed
 
@@ -106,7 +100,21 @@ def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]
     plain = named[1] or [trial for trial in free if not unit.loads(trial)]
     for option, trials in zip(_OPTIONS, (heavy, plain), strict=True):
         _check_set(unit, option, trials, ready)
-    _check_apart(unit, heavy, plain)
+    twice = [trial.stem for trial in heavy if trial in plain]
+    if twice:
+        raise UsageError(
+            f"{listed(twice)} in --with and in --without",
+            file=unit.name,
+            expected="every recording in one of them",
+            remedy="name recordings as in squat_run-2 where a task has both",
+        )
+    if _carried(unit, heavy[0]) == _carried(unit, plain[0]):
+        raise UsageError(
+            f"{heavy[0].stem} and {plain[0].stem} carry the same declared load, or none",
+            file=unit.name,
+            expected="a load in [[loads]] of study.toml that is carried in one set only",
+            remedy="declare it, with `tasks` or `runs` of the recordings that carry it",
+        )
     return heavy, plain
 
 
@@ -154,25 +162,6 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
         )
 
 
-def _check_apart(unit: Unit, heavy: list[Trial], plain: list[Trial]) -> None:
-    """No recording is in both sets, and a declared load distinguishes them."""
-    twice = [trial.stem for trial in heavy if trial in plain]
-    if twice:
-        raise UsageError(
-            f"{listed(twice)} in --with and in --without",
-            file=unit.name,
-            expected="every recording in one of them",
-            remedy="name recordings as in squat_run-2 where a task has both",
-        )
-    if _carried(unit, heavy[0]) == _carried(unit, plain[0]):
-        raise UsageError(
-            f"{heavy[0].stem} and {plain[0].stem} carry the same declared load, or none",
-            file=unit.name,
-            expected="a load in [[loads]] of study.toml that is carried in one set only",
-            remedy="declare it, with `tasks` or `runs` of the recordings that carry it",
-        )
-
-
 def _carried(unit: Unit, trial: Trial) -> list[dict]:
     """Segment, mass and position of each load, in any order."""
     return sorted(loads_record(unit, trial), key=str)
@@ -193,12 +182,9 @@ def _tables(unit: Unit) -> Iterator[Table]:
             (*_FIRST, _DIFFERENCE, _DECLARED),
             tuple(map(_row, loaded.to_dict("records"))),
             (
-                "Difference: with less without, and its 95 % interval. m: mass; mc: first moment "
-                "and I: inertia about the segment's joint; c: centre of what was added, from the "
-                "segment's origin, in the segment's frame (X anterior, Y up, Z right).",
+                TEXTS["compare_loads"]["difference"],
                 *(  # where a load cannot be distinguished from none
-                    f"On the {segment_label(segment)} these recordings show no load: the mass may "
-                    "be zero. Longer ones that move the segment more have narrower intervals."
+                    TEXTS["compare_loads"]["none"].format(segment=segment_label(segment))
                     for segment in loaded[(loaded["quantity"] == "m") & may_be_none]["segment"]
                 ),
             ),
@@ -210,8 +196,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
         (*_FIRST, _DIFFERENCE, _DECLARED, _EXPECTED),
         tuple(map(_row, masses.to_dict("records"))),
         (
-            "To be expected: the forces hardly show how segments that a joint connects share a "
-            "mass; so much of the declared load should be found, within the interval.",
+            TEXTS["compare_loads"]["expected"],
             f"First moments and tensors of all segments: {unit.path('load-comparison')}",
         ),
     )
@@ -226,11 +211,8 @@ def _row(values: dict) -> Row:
     return Row({"segment": name, "quantity": values["quantity"], "unit": unit, **cells})
 
 
-_FIRST = (
-    Column(("segment",), "Segment", text=True),
-    Column(("quantity",), "Quantity", text=True),
-    Column(("unit",), "Unit", text=True),
-)
+_NAMES = ("segment", "quantity", "unit")
+_FIRST = tuple(Column((name,), name.capitalize(), text=True) for name in _NAMES)
 _DIFFERENCE = Column(("difference", "ci_low", "ci_high"), "Difference", "{} ({} to {})".format)
 _DECLARED = Column(("declared",), "Declared")
 _EXPECTED = Column(("expected",), "To be expected")
@@ -262,10 +244,10 @@ def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence
             expected="a load on a segment with markers",
             remedy="record with markers there, or put the load on another segment",
         )
-    prior = prior_from(unit, unit.read("regression"), person)
+    prior = identification_problem.prior_from(unit, unit.read("regression"), person)
     heavy, plain = (_problem(loads_off, person, prior, trials) for trials in sets)
     estimator = unit.config.identify.estimators[0]
-    a, b = (estimate_by(estimator, problem) for problem in (plain, heavy))
+    a, b = (identification_problem.estimate_by(estimator, problem) for problem in (plain, heavy))
     change = difference(a, b, prior.root @ prior.root.T)
     one = _Block(TWO, change.phi, change.covariance, declared, change.resolution @ declared)
     rows = [one.total(), *one.rows(skeleton.body_names)]
@@ -292,8 +274,8 @@ def _names(person: Person, segments: Sequence[int]) -> str:
 
 
 def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) -> Problem:
-    recordings, _ = recordings_of(unit, person, trials)
-    seconds = duration_s(recordings)
+    recordings, _ = identification_problem.recordings_of(unit, person, trials)
+    seconds = identification_problem.duration_s(recordings)
     if seconds < _SHORTEST_S:
         raise BadDataError(
             f"{listing([trial.stem for trial in trials])}: {seconds:.2f} s of motion with every "
@@ -302,7 +284,7 @@ def _problem(unit: Unit, person: Person, prior: Prior, trials: Sequence[Trial]) 
             expected=f"at least {_SHORTEST_S:g} s",
             remedy="name other trials with --with and --without",
         )
-    problem, _ = problem_of(unit, person, prior, recordings)
+    problem, _ = identification_problem.problem_of(unit, person, prior, recordings)
     return problem
 
 

@@ -15,20 +15,9 @@ from scipy.ndimage import binary_erosion
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from, remove, write_bytes
-from bsip_cli.body.exports import FORMATS, bids_motion
+from bsip_cli.body.exports import FORMATS, bids_motion, osim_given
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim_given import (
-    BodyMap,
-    GivenModel,
-    check_fits,
-    check_segments,
-    fitting_map,
-    load_body_map,
-    read_given_model,
-    shipped_names,
-    with_inertias,
-)
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.commands.export_recording import export_recordings
@@ -272,13 +261,15 @@ def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
     model, body_map = _given_model(request.model_file, request.model_bodies, skeleton)
 
     def given(body: IdentifiedPerson) -> tuple[str, str]:
-        result = with_inertias(model, body_map, body)
+        result = osim_given.with_inertias(model, body_map, body)
         return result.text, f"{model.file}, map {body_map.name}: {result.sentence}"
 
     return {**writers, FORMATS["osim"][0]: given}
 
 
-def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[GivenModel, BodyMap]:
+def _given_model(
+    file: Path, name: str | None, skeleton: Skeleton
+) -> tuple[osim_given.GivenModel, osim_given.BodyMap]:
     check_regular(file, UsageError)
     try:
         content = file.read_bytes()
@@ -286,18 +277,18 @@ def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[Give
         raise UsageError(
             f"cannot be read ({error.strerror})", file=file, remedy="check --model-file"
         ) from None
-    model = read_given_model(content, file.name)
-    body_map = load_body_map(name) if name else fitting_map(model.masses_kg)
+    model = osim_given.read_given_model(content, file.name)
+    body_map = osim_given.load_body_map(name) if name else osim_given.fitting_map(model.masses_kg)
     if body_map is None:
         raise UsageError(
-            f"its bodies fit no shipped map ({', '.join(shipped_names())})",
+            f"its bodies fit no shipped map ({', '.join(osim_given.shipped_names())})",
             file=file,
             expected=f"bodies as in one of them; it has {', '.join(model.masses_kg) or 'none'}",
             remedy="write a map like configs/opensim/rajagopal.toml and give it with "
             "--model-bodies",
         )
-    check_segments(body_map, skeleton)
-    check_fits(model, body_map)
+    osim_given.check_segments(body_map, skeleton)
+    osim_given.check_fits(model, body_map)
     return model, body_map
 
 
@@ -345,10 +336,7 @@ def _export(
 def _chosen(unit: Unit) -> tuple[str, str]:
     """The method that `bsip choose` found best over all movements, and why.
 
-    Raises
-    ------
-    UsageError
-        It has not chosen, or of an earlier identification.
+    UsageError: It has not chosen, or of an earlier identification.
     """
     path = unit.path("choice")
     if not path.exists() or not is_made_from(path, unit.path("identification")):
@@ -365,12 +353,8 @@ def _chosen(unit: Unit) -> tuple[str, str]:
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:
     """The participant's geometry and one method's inertias, as the artifacts have them.
 
-    Raises
-    ------
-    UsageError
-        There is no such method.
-    BadDataError
-        The tables belong to another skeleton, or hold no numbers.
+    UsageError: There is no such method.
+    BadDataError: The tables belong to another skeleton, or hold no numbers.
     """
     tables = {kind: unit.read(kind) for kind in _READER.reads}
     rows = tables["bsip"]

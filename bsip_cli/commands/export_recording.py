@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import empty_table, is_made_from
-from bsip_cli.diagnosis.cause import (
-    Cause,
-    corrected_plates,
-    delay_by,
-    is_fault_of_forces,
-)
+from bsip_cli.artifacts import is_made_from
+from bsip_cli.commands import named_causes as named
+from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by, is_fault_of_forces
 from bsip_cli.diagnosis.nameless import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
-from bsip_cli.effects.plates import ALL, Delay, PlateZero, loaded_plates
+from bsip_cli.effects.plates import ALL, Delay, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -45,7 +39,7 @@ from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import markers_from, person_of
 from bsip_cli.stages.survey import opened, reading_of
-from bsip_cli.stages.trial_scene import causes_of, plates_of
+from bsip_cli.stages.trial_scene import plates_of
 
 _READER = Stage(
     "export",
@@ -67,8 +61,6 @@ _READER = Stage(
 )
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
 _AT_ONCE_S = 1e-9
-_NO_INTERVAL = np.full((1, 2), np.nan)
-_NO_FAULT_OF_IT = "no fault of the plates, the clocks, the axes or the labels"
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
 
@@ -158,20 +150,16 @@ class _Correction:
         self.causes: dict[Cause, str] = {}  # and what else it may be
         self._diagnosis = diagnosis = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in causes_here(unit, [*self._plates], [*self._zeros]):
-            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, diagnosis)
+        for cause in named.causes_here(unit, [*self._plates], [*self._zeros]):
+            words = named.called(cause.effect.name, cause.target)
+            alike = named.alike(cause, diagnosis)
             known |= {(cause.effect.name, cause.target), *alike}
-            others = " or ".join(
-                "what acts like it and has no name"
-                if effect == UNEXPLAINED
-                else f"{effect} {target}".strip()
-                for effect, target in alike
-            )
+            others = " or ".join(named.called(*one) for one in alike)
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
-            elif not is_corrected(cause):
-                self.left.append(f"{words}: {_NO_FAULT_OF_IT}")
+            elif not named.is_corrected(cause.effect):
+                self.left.append(f"{words}: {named.NO_FAULT_OF_IT}")
             elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
                 self.left.append(f"{words}: no plate shows where the axes are")
             elif alike and not all(
@@ -181,20 +169,22 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[self._as_diagnosed(cause)] = others
-        here = _said_of(unit.name, diagnosis, [*EFFECTS])
+        here = named.said_of(unit.name, diagnosis, [*EFFECTS])
         self.left += dict.fromkeys(
-            f"{effect} {target}".strip() + f": {_why_left(effect, 'its size is not known', group)}"
-            for effect, target, group in here[["effect", "target", "class_id"]].to_numpy()
-            if (effect, target) not in known
+            f"{named.called(*one)}: {named.why_left(one[0], 'its size is not known', group)}"
+            for *one, group in here[["effect", "target", "class_id"]].to_numpy()
+            if tuple(one) not in known
         )
         # what is there and has no name, or acts like a fault but not evenly
         self.left += dict.fromkeys(
             f"{sentence}: its signal is not known exactly"
-            for sentence in _said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
+            for sentence in named.said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
         )
-        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else diagnosis[:0]
+        about = (
+            named.of_the_laboratory(unit, "named", "ambiguous") if self._plates else diagnosis[:0]
+        )
         self.left += dict.fromkeys(
-            f"{sentence}: {_why_left(effect, 'no size of it is known for this recording')}"
+            f"{sentence}: {named.why_left(effect, 'no size of it is known for this recording')}"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
             if (effect, target) not in known
             and target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
@@ -209,7 +199,7 @@ class _Correction:
     def _as_diagnosed(self, cause: Cause) -> Cause:
         """With the sizes that the diagnosis reports; of the laboratory those by all persons: for
         ``extend`` a person's own recordings are left out of them."""
-        found = _rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
+        found = named.rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
         names = [one.name for one in cause.effect.parameters(self._scene, cause.target)]
         if not found.index.is_unique or not {*names} <= {*found.index}:
             return cause
@@ -218,7 +208,6 @@ class _Correction:
     @property
     def said(self) -> list[str]:
         """Repairs of plates, faults of plates and clocks with their sizes, and exchanged labels."""
-        scene = self._scene if self.causes else None
         last, cut = self._opened.recording.n_frames, self._kept
         return [
             *(
@@ -226,12 +215,13 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
-            *(_zero_words(*one) for one in self._zeros.items() if is_noticed(one[1])),
             *(
-                _words(*one, scene, self._diagnosis)
-                for one in self.causes.items()
-                if scene is not None
+                f"plate {name}: its reading without load, "
+                f"({', '.join(f'{x:.1f}' for x in zero[:3])}) N, subtracted"
+                for name, zero in self._zeros.items()
+                if is_noticed(zero)
             ),
+            *(named.words_of(*x, self._scene, self._diagnosis) for x in self.causes.items()),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
                 for a, b, start, end in self._swaps
@@ -384,131 +374,11 @@ class _Correction:
         return points
 
 
-def is_corrected(cause: Cause) -> bool:
-    """Of the plates, the clocks, or the axes of laboratory and cameras."""
-    return _can_be_corrected(cause.effect)
-
-
-def _can_be_corrected(effect: Effect) -> bool:
-    return is_fault_of_forces(effect) or isinstance(effect, Turned)
-
-
-def _why_left(effect: str, unknown: str, group: str = "") -> str:
-    """Why what has no cause in the facts is not corrected. group : in which it is one of several;
-    unknown : what is said of a fault that could be corrected."""
-    if group:
-        return "one of several causes that look alike"
-    known = EFFECTS.get(effect)
-    can_be = known is not None and (_can_be_corrected(known) or isinstance(known, MarkerSwap))
-    return unknown if can_be else _NO_FAULT_OF_IT
-
-
-def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -> list[Cause]:
-    """What the diagnosis names in a recording, on the plates that it has.
-
-    Where it did not look at it: what it names of the instruments in all others of the session, at
-    least two, and what the laboratory of the person is known to have, but for offsets of plates
-    whose zero this recording shows (``zeroed``).
-    """
-    analysed, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
-    here = [one for one in causes if unit.name in one.trials]
-    if unit.name in analysed:
-        return here
-    session = {t.stem for t in unit.person.trials if t.session == unit.own_trial.session}
-    others = session & set(analysed)
-    shared = [
-        one
-        for one in causes
-        if one.effect.is_of_laboratory and is_corrected(one) and others <= set(one.trials)
-    ]
-    shared = shared if len(others) > 1 else []
-    known = {(one.effect.name, one.target) for one in shared}
-    named = _of_the_laboratory(unit, "named")
-    named = named[named["scope"] == "laboratory"]
-    for (effect, target), sizes in named.groupby(["effect", "target"], sort=False):
-        if (effect, target) not in known:
-            values = sizes["estimate"].to_numpy()
-            cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
-            shared.append(cause)
-    there = {"", ALL, *plates}
-    return [
-        *here,
-        *(
-            one
-            for one in shared
-            if one.target.split(" ")[0]
-            in (there - {*zeroed} if isinstance(one.effect, PlateZero) else there)
-        ),
-    ]
-
-
-def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
-    """Rows about the laboratory of a person who was in one only, with others, or about this
-    session in it."""
-    of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
-    mine = [number for number, persons in of_all if {unit.person.id} < {*persons}]
-    if len(mine) != 1:  # alone the person's own diagnosis, which asks more of it, is the answer
-        return empty_table("laboratory")
-    rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
-    session = "_ses-".join(filter(None, (unit.person.id, unit.own_trial.session)))
-    return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
-
-
-def _rows_of(cause: Cause, diagnosis: pd.DataFrame) -> pd.DataFrame:
-    """What the diagnosis says of a cause, a row for each number; what is known from the laboratory
-    may be rejected as this person's own."""
-    key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
-    is_it = (diagnosis[[*key]] == pd.Series(key)).all(axis=1)
-    return diagnosis[is_it & (diagnosis["verdict"] != "rejected")]
-
-
-def _alike(cause: Cause, diagnosis: pd.DataFrame) -> list[tuple[str, str]]:
-    """Effects and targets that look like a cause in these recordings."""
-    groups = set(_rows_of(cause, diagnosis)["class_id"]) - {""}
-    is_it = (diagnosis["effect"] == cause.effect.name) & (diagnosis["target"] == cause.target)
-    others = diagnosis[diagnosis["class_id"].isin(groups) & ~is_it]
-    return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
-
-
-def _said_of(trial: str, diagnosis: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
-    """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
-    here = np.array([trial in names.split(", ") for names in diagnosis["trials"]], dtype=bool)
-    return diagnosis[
-        here & diagnosis["effect"].isin(effects) & (diagnosis["verdict"] != "rejected")
-    ]
-
-
 def _stated(reading: PlateReading) -> PlateReading:
     """Without the repairs that other numbers in the channels make needless."""
     return replace(
         reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
     )
-
-
-def _zero_words(name: str, zero: np.ndarray) -> str:
-    force = ", ".join(f"{x:.1f}" for x in zero[:3])
-    return f"plate {name}: its reading without load, ({force}) N, subtracted"
-
-
-def _words(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -> str:
-    """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
-    readers of C3D know."""
-    values, rows = [], _rows_of(cause, diagnosis)
-    for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
-        factor, readable = readable_unit(name, unit)
-        mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's own
-        nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
-        low, high = (
-            factor * (nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL)[0]
-        )
-        size, interval = f"{factor * value:.3g}", ""
-        if high > low:
-            size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))
-            interval = f" (95 % interval {' to '.join(ends)})"
-        values.append(f"{name} {with_unit(size, readable)}{interval}")
-    alike = f" (as likely {others}, with the same sum of forces)" if others else ""
-    words = " ".join(filter(None, (cause.effect.name, cause.target)))
-    return f"{words}: {', '.join(values)} taken off{alike}".replace("°", " deg")
 
 
 def _in_reading(

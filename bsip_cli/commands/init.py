@@ -22,16 +22,8 @@ from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
 from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
+from bsip_cli.study import participants
 from bsip_cli.study.new_study import Named, counted, is_sequence, name_all, plain
-from bsip_cli.study.participants import (
-    KNOWN,
-    NAME,
-    UNKNOWN,
-    PeopleTable,
-    Row,
-    participant_of,
-    read_people,
-)
 from bsip_cli.study.trials import listed
 
 # --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
@@ -53,7 +45,7 @@ def read_tables(
     wanted = {name.removeprefix("sub-").casefold(): name for name in people}
     for file in files:
         try:
-            table = read_people(file)
+            table = participants.read_people(file)
         except BadDataError as refusal:
             notes.append(str(refusal))
             continue
@@ -72,9 +64,11 @@ def read_tables(
     return said, notes
 
 
-def _stated(row: Row, table: PeopleTable) -> tuple[StatedPerson, tuple[str, ...]]:
-    person = participant_of(row, table)
-    is_stated = row.cells[table.columns["sex"].index].casefold() not in UNKNOWN
+def _stated(
+    row: participants.Row, table: participants.PeopleTable
+) -> tuple[StatedPerson, tuple[str, ...]]:
+    person = participants.participant_of(row, table)
+    is_stated = row.cells[table.columns["sex"].index].casefold() not in participants.UNKNOWN
     stated = StatedPerson(person.mass_kg, person.height_m, person.sex if is_stated else "")
     return stated, person.notes
 
@@ -166,9 +160,9 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
     BadDataError: no recording can be used.
     """
     wished = participant
-    if participant and not NAME.fullmatch(participant):
+    if participant and not participants.NAME.fullmatch(participant):
         participant = f"sub-{participant}"
-        if not NAME.fullmatch(participant):
+        if not participants.NAME.fullmatch(participant):
             raise UsageError(
                 f"--participant {wished!r}",
                 expected="sub- and letters or digits",
@@ -264,7 +258,7 @@ def _write(plan: _Plan) -> None:
                 for known in [(one.mass_kg, one.height_m)]
             ]
             texts = {
-                "participants.tsv": _table([KNOWN, *people]),
+                "participants.tsv": _table([participants.KNOWN, *people]),
                 "study.toml": _study_toml(plan),
                 "sources.tsv": _table(_source_rows(plan)),
             } | ({STARTER: plan.markers.starter} if plan.markers.starter else {})

@@ -15,13 +15,7 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.labels import LabelMatch, match_labels
-from bsip_cli.recordings.marker_guess import (
-    Guess,
-    fits,
-    starter_toml,
-    told_from,
-    with_pairs_named,
-)
+from bsip_cli.recordings.marker_guess import Guess, fits, starter_toml, told_from, with_pairs_named
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.segments import in_words, without_side

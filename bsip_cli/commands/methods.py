@@ -17,21 +17,11 @@ from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
 from bsip_cli.report.effect_words import effect_title
-from bsip_cli.report.words import listing
+from bsip_cli.report.records import flat
+from bsip_cli.report.words import TEXTS, listing
 
 _WITH_OPTIONS = ("wrench", "skeleton", "kinematics", "regression", "bsip", "fit")
 _LATER = ("diagnosis", "joint-moments")  # may be missing: a user runs as many stages as needed
-_REFERENCES = {
-    "dumas2007": "Dumas, Chèze, Verriest 2007, J Biomech 40:543-553; corrigendum, 40:1651-1652",
-    "dumas2015": "Dumas, Robert, Chèze, Verriest 2015, Int Biomech 2:113-118",
-    "grood1983": "Grood, Suntay 1983, J Biomech Eng 105:136-144",
-    "hansen2017": "Hansen, Rezzoug, Gorce, Isableu, Venture 2017, PLoS ONE 12:e0180011",
-    "robert2017": "Robert, Leborgne, Abid, Bonnet, Venture, Dumas 2017, Comput Methods Biomech "
-    "Biomed Engin 20(S1):S175",
-    "wensing2018": "Wensing, Kim, Slotine 2018, IEEE Robot Autom Lett 3:60-67",
-    "wu2002": "Wu and others 2002, J Biomech 35:543-548",
-    "wu2005": "Wu, van der Helm, Veeger and others 2005, J Biomech 38:981-992",
-}
 _NO_FAULT = ("none", "unexplained", "inconclusive")
 
 
@@ -71,9 +61,8 @@ class _Results:
         self.cited += [key for key in keys if key not in self.cited]
         return f"[{', '.join(str(self.cited.index(key) + 1) for key in keys)}]"
 
-    @property
     def references(self) -> list[str]:
-        return [f"[{n}] {_REFERENCES[key]}." for n, key in enumerate(self.cited, start=1)]
+        return [f"[{n}] {TEXTS['references'][key]}." for n, key in enumerate(self.cited, start=1)]
 
     def _files(self, kind: str) -> Iterator[Path]:
         for folder in self.people:
@@ -81,6 +70,9 @@ class _Results:
 
     def _tables(self, kind: str) -> Iterator[pd.DataFrame]:
         return (read_artifact(path, kind) for path in self._files(kind))
+
+    def has(self, kind: str) -> bool:
+        return any(True for _ in self._files(kind))
 
     @cached_property
     def _made(self) -> list[Mapping[str, Any]]:
@@ -94,7 +86,8 @@ class _Results:
         """By name, the values with which the artifacts were made; more than one if they differ."""
         found: dict[str, dict[str, Any]] = {}
         for made in self._made:
-            for name, value in _flat(made["options"]):
+            known = {name: x for name, x in made["options"].items() if name != "participant"}
+            for name, value in flat(known):
                 found.setdefault(name, {})[json.dumps(value)] = value
         return {name: list(values.values()) for name, values in found.items()}
 
@@ -102,21 +95,18 @@ class _Results:
         """Of the first artifact; `differing` names those of which there are more."""
         return self._options[name][0]
 
-    @property
     def differing(self) -> list[str]:
         return sorted(name for name, values in self._options.items() if len(values) > 1)
 
-    @property
     def changed(self) -> list[str]:
         """``name = value`` of options other than the defaults."""
-        defaults = dict(_flat(load_config([]).model_dump(mode="json")))
+        defaults = dict(flat(load_config([]).model_dump(mode="json")))
         return [
             f"{name} = {json.dumps(values[0])}"
             for name, values in sorted(self._options.items())
             if name in defaults and values[0] != defaults[name]
         ]
 
-    @property
     def versions(self) -> str:
         """One for each bsip and code that made any of it."""
         made = sorted({made["bsip_version"] for made in self._made})
@@ -131,7 +121,6 @@ class _Results:
     def persons(self) -> pd.DataFrame:
         return pd.concat(self._tables("person"), ignore_index=True)
 
-    @property
     def sexes(self) -> str:
         counts = Counter(self.persons["sex"])
         titles = {"M": "male", "F": "female", "other": "of other or unknown sex"}
@@ -146,7 +135,6 @@ class _Results:
             return f"{values.iloc[0]:.{digits}f}"
         return f"{values.mean():.{digits}f} ± {values.std():.{digits}f}"
 
-    @property
     def trials(self) -> str:
         """How many of which task."""
         tasks = Counter(
@@ -154,12 +142,10 @@ class _Results:
         )
         return listing([f"{n} of {task}" for task, n in sorted(tasks.items())])
 
-    @property
     def marker_sets(self) -> str:
         found = (read_header(path)["provenance"]["facts"] for path in self._files("person"))
         return listing(sorted({facts["marker_set"] for facts in found}))
 
-    @property
     def rates(self) -> str:
         times = (table["time_s"] for table in self._tables("kinematics"))
         found = {round(1.0 / float(np.median(np.diff(one))), 1) for one in times}
@@ -172,17 +158,11 @@ class _Results:
         table = pd.concat(self._tables("identification"), ignore_index=True)
         return table[table["method"] == "OM"]
 
-    @property
     def chosen(self) -> str:
         """For how many persons which parameters are to be used; empty before ``choose``."""
         uses = Counter(table["use"].iloc[0] for table in self._tables("choice"))
         return listing([f"{use} for {n}" for use, n in sorted(uses.items())], empty="")
 
-    @property
-    def is_diagnosed(self) -> bool:
-        return any(True for _ in self._files("diagnosis"))
-
-    @property
     def causes(self) -> str:
         """Named causes and in how many persons."""
         found: Counter[str] = Counter()
@@ -193,17 +173,3 @@ class _Results:
                 named = table.loc[table["verdict"] == "named", "effect"]
                 found.update(set(named) - set(_NO_FAULT))
         return listing([f"{effect_title(effect)} ({n})" for effect, n in found.most_common()], "")
-
-    @property
-    def has_joints(self) -> bool:
-        return any(True for _ in self._files("joint-moments"))
-
-
-def _flat(options: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Entries of nested options as ``section.name``; what is known of the participant left out."""
-    for name, value in options.items():
-        if isinstance(value, Mapping):
-            if name != "participant":
-                yield from _flat(value, f"{before}{name}.")
-        else:
-            yield f"{before}{name}", value

@@ -33,12 +33,8 @@ _MOST = 3  # causes of a person, without --full: all fits on a screen of 24 line
 def shown(out: Path, full: bool = False) -> Iterator[str]:
     """The parts of the answer, in order; with ``full`` tables and causes with all their numbers.
 
-    Raises
-    ------
-    UsageError
-        Nothing to show has been written there, or it is a file.
-    BadDataError
-        A diagnosis cannot be read.
+    UsageError: Nothing to show has been written there, or it is a file.
+    BadDataError: A diagnosis cannot be read.
     """
     if out.is_file():
         raise UsageError(
@@ -122,7 +118,9 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
     right = corrected_sentence(_of_trials(folder, "marker-events"))
     if light := _light(folder):
         found = replace(found, headline=f"{light.title}. {light.text}")
-    changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
+    peaks = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
+    peaks_of_all = pd.concat(peaks, ignore_index=True) if peaks else pd.DataFrame()
+    changed = tuple(f"{said}." for said in largest_changes(peaks_of_all))
     found = replace(found, results=(*found.results, *changed))
     return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
@@ -166,12 +164,6 @@ def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:
     ending = f"_{SCHEMAS[kind].file_name}.parquet"
     paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
     return [(path.name.removesuffix(ending), read_artifact(path, kind)) for path in paths]
-
-
-def _peaks(folder: Path) -> pd.DataFrame:
-    """``joint-peaks`` of all trials, with a column ``trial``."""
-    tables = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
 def _no_more_true(out: Path) -> Iterator[str]:

@@ -17,6 +17,7 @@ from markupsafe import Markup
 
 from bsip_cli.errors import printable
 from bsip_cli.report.cause_colours import Piece, fills
+from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -136,8 +137,6 @@ class Cell:
 class Grid(Block):
     """A table.
 
-    Attributes
-    ----------
     head : titles of the columns, with units.
     rows : as many cells each as ``head``; a string is a plain cell.
     groups : titles over several columns, with how many they span; empty for none.
@@ -162,8 +161,6 @@ class Grid(Block):
 class Picture(Block):
     """A figure, and what a reader wants to know of it.
 
-    Attributes
-    ----------
     shows : what is drawn. reading : what better and worse look like. action : what to do then.
     name : of its files: NAME.svg, and NAME.csv with ``data``, the numbers behind it.
     """
@@ -187,6 +184,12 @@ class Picture(Block):
         from bsip_cli.report.figures.canvas import to_svg
 
         return to_svg(self.figure)
+
+
+def picture(name: str, figure: Figure, data: pd.DataFrame, **words: str) -> Picture:
+    """A figure with its texts of ``texts.toml``, into which ``words`` are put."""
+    texts = {part: text.format(**words) for part, text in TEXTS["pictures"][name].items()}
+    return Picture(figure, name, data=data, **texts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,16 +220,11 @@ class Document:
         for section in self.sections:
             yield from section.blocks
 
-    def pictures(self) -> Iterator[Picture]:
-        yield from (block for block in self.blocks() if isinstance(block, Picture))
-
 
 # --- a document as one self-contained HTML page ---------------------------------------------------
 
 
-FILES = "figures"
-"""Folder next to the page that holds its figures and the numbers behind them."""
-
+FILES = "figures"  # folder next to the page that holds its figures and the numbers behind them
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -241,7 +239,7 @@ def render(document: Document) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["svg_source"] = _svg_source
+    environment.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
     environment.filters["tied"] = _tied
     style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
     return environment.get_template("report.html.j2").render(
@@ -260,24 +258,5 @@ def _tied(text: str) -> str:
     return re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
 
 
-def _svg_source(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"
-
-
-_GLOSSARY = (
-    ("COP", "Centre of pressure: where on the plate the ground force acts."),
-    ("RM", "Regression method: segment parameters from an anthropometric table."),
-    ("RM+mass", "RM, all masses and tensors times one number, so that the plates' weight fits."),
-    ("OM", "Optimisation method: parameters identified from this person's movement and forces."),
-    ("OM+causes", "OM identified again with every named fault in the model."),
-    ("Segment parameters", "Mass, centre of mass and moments of inertia of a body segment."),
-    ("Data decide", "Part of the table's uncertainty that the recordings removed; 0: the table."),
-    ("Error budget", "What makes the squared difference of simulated and measured forces."),
-    ("Held out", "Data that identified nothing, on which methods are compared."),
-    ("Probability", "That a fault is there, given all else that was found."),
-    ("95 % interval", "Holds the true value in 95 of 100 such recordings."),
-    ("sd", "Standard deviation."),
-    ("BW", "Body weight."),
-)
-WORDS = Section("words", "What do the words mean?", (Terms(_GLOSSARY),))
-"""The glossary of every report."""
+# The glossary of every report.
+WORDS = Section("words", "What do the words mean?", (Terms(tuple(TEXTS["glossary"].items())),))

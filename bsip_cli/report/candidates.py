@@ -16,17 +16,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
-from bsip_cli.report.effect_words import (
-    MAIN_NUMBERS,
-    OBJECTS,
-    USUAL,
-    effect_title,
-    parameter_label,
-    place_label,
-    size_words,
-    unnamed_label,
-    usual_words,
-)
+from bsip_cli.report import effect_words
 from bsip_cli.report.words import capital, number, true_minus
 
 NOTHING = "none"
@@ -90,10 +80,10 @@ class Candidate:
     @property
     def label(self) -> str:
         """``force plate turned or tilted: plate 1``."""
-        where = place_label(self.effect, self.target)
+        where = effect_words.place_label(self.effect, self.target)
         if self.effect == UNNAMED and self.numbers and self.target:
-            where = unnamed_label(self.numbers[0].name, where)
-        return effect_title(self.effect) + (f": {where}" if where else "")
+            where = effect_words.unnamed_label(self.numbers[0].name, where)
+        return effect_words.effect_title(self.effect) + (f": {where}" if where else "")
 
     @property
     def is_of_all(self) -> bool:
@@ -115,28 +105,28 @@ class Candidate:
         interval = main.interval(bool(_SIGNED.search(what))) if main else ""
         if main is None or not interval:
             return what + remark
-        name = parameter_label(self.effect, main.name)
+        name = effect_words.parameter_label(self.effect, main.name)
         name = "" if name in what else name
         return f"{what} ({name}{': ' if name else ''}95 % interval {interval}){remark}"
 
     def main_number(self) -> Number | None:
         """The number that the effect is about; of several alike, the one that is known best."""
-        wanted = MAIN_NUMBERS.get(self.effect, ())
+        wanted = effect_words.MAIN_NUMBERS.get(self.effect, ())
         main = [n for n in self.numbers if n.name in wanted]
         sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
         return max(sizes or self.numbers, key=Number.certainty, default=None)
 
     def against_usual(self) -> str:
         """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
-        size, usual = self.main_number(), USUAL.get(self.effect)
-        if size is None or usual is None or self.effect in OBJECTS:
+        size, usual = self.main_number(), effect_words.USUAL.get(self.effect)
+        if size is None or usual is None or self.effect in effect_words.OBJECTS:
             return ""
         if size.name not in usual.parameters or size.unit != usual.unit:
             return ""
         shown = float(f"{abs(size.value):.2g}")  # as it is read
         how = "smaller than usual" if shown < usual.least else "a usual size"
         how = "larger than usual" if shown > usual.most else how
-        return f", {how} ({usual_words(self.effect)})"
+        return f", {how} ({effect_words.usual_words(self.effect)})"
 
     def removes(self) -> str:
         """``61.1 (-19.6 to 100.0)``, percent of the squared difference in unseen seconds."""
@@ -225,7 +215,7 @@ class Limit:
     trials: int
 
     def in_words(self) -> str:
-        return size_words(self.parameter, self.unit, self.size)
+        return effect_words.size_words(self.parameter, self.unit, self.size)
 
 
 def limits_of(

@@ -6,21 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-FAULT, REST, NOISE, UNKNOWN = "fault", "rest", "noise", "unknown"
-COLOURS = {
-    "inertial_parameters": "#0072B2",
-    "joint_centres": "#56B4E9",
-    "marker_places": "#009E73",
-    "soft_tissue": "#E69F00",
-    "trunk_and_shoulders": "#F0E442",
-    "smoothing": "#CC79A7",
-    FAULT: "#D55E00",
-    REST: "#d4d4d4",
-    NOISE: "#ffffff",
-    UNKNOWN: "#ffffff",
-}
-"""By term of the error budget; all faults have one, and differ by their hatching."""
+from bsip_cli.report.words import TEXTS
 
+FAULT, REST, NOISE, UNKNOWN = "fault", "rest", "noise", "unknown"
+# By term of the error budget; all faults have one, and differ by their hatching.
+COLOURS: dict[str, str] = TEXTS["colours"]
 HATCHES = ("", "||", "--", "..")
 _INK = "#1c1c1c"
 _CSS = {

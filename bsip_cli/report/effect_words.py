@@ -11,16 +11,12 @@ from pathlib import Path
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import plates_called
-from bsip_cli.report.words import listing, number, segment_label
+from bsip_cli.report.words import TEXTS, listing, number, segment_label
 from bsip_cli.segments import SEGMENTS
 
 _FILE = Path(__file__).with_suffix(".toml")
 _WORDS = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-WEIGHT = (
-    "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
-    "mass are the plates at fault, or something that is carried.",
-    "Weigh the person on a scale first.",
-)
+WEIGHT: tuple[str, str] = tuple(TEXTS["weight"])  # where quiet stance contradicts a stated mass
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,11 @@ from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
 from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
+from bsip_cli.report.words import COMPONENTS, TEXTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
 
-_IN_WORDS = {
-    OM: "OM (segment parameters identified from this person)",
-    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
-    RM: "RM (segment parameters of an anthropometric table)",
-}
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
 
@@ -122,9 +117,9 @@ def use_sentence(
     the artifacts of these names."""
     use = "Once the large error is gone, use" if is_wrong else "Use"
     if choice is None or choice.empty:
-        return f"{use} {_IN_WORDS[RM]}: nothing was compared."
+        return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
-    said = f"{use} {_IN_WORDS[str(first['use'])]}{_compared(first)}."
+    said = f"{use} {TEXTS['methods_in_full'][str(first['use'])]}{_compared(first)}."
     others = [
         f"For {listing(list(rows['movement']))} use {method}: OM is "
         f"{'' if method == OM else 'not '}clearly better there."
@@ -181,9 +176,7 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
-ENDS_AT = 2.0
-"""Times the size that is called large, where every scale ends."""
-
+ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
@@ -275,16 +268,6 @@ UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
 _LAST = ("noise", UNKNOWN)
-_WORDS = {
-    "inertial_parameters": PARAMETERS,
-    "joint_centres": "joint centres",
-    "marker_places": "places of the markers",
-    "soft_tissue": "soft tissue",
-    "trunk_and_shoulders": "trunk and shoulders that bend",
-    "smoothing": "smoothing of the motion",
-    "noise": "noise",
-    "unknown": UNKNOWN,
-}
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
 LEAST_REPORTED_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
@@ -327,7 +310,8 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     for terms in _groups(rows):
         label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
         share = float(rows.loc[list(terms), "share_percent"].sum())
-        piece = Piece(label, share, tuple(dict.fromkeys(map(_kind, terms))))
+        kinds = [cause_colours.FAULT if term.startswith(_FAULT) else term for term in terms]
+        piece = Piece(label, share, tuple(dict.fromkeys(kinds)))
         least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
@@ -355,11 +339,7 @@ def term_words(term: str) -> str:
     """A term of the budget in words."""
     if term.startswith(_FAULT):
         return EFFECT_WORDS[term.removeprefix(_FAULT)].title
-    return _WORDS[term]
-
-
-def _kind(term: str) -> str:
-    return cause_colours.FAULT if term.startswith(_FAULT) else term
+    return str(TEXTS["terms"][term])
 
 
 def _label(term: str, found: Collection[str]) -> str:

@@ -8,25 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report.blocks import (
-    Bar,
-    Block,
-    Bullets,
-    Heading,
-    Light,
-    Links,
-    Numbered,
-    Paragraph,
-    Portrait,
-    Scales,
-    Terms,
-)
-from bsip_cli.report.candidates import (
-    OF_THE_WEIGHT,
-    analysed,
-    effects_in,
-    is_large,
-)
+from bsip_cli.report import blocks, verdict
+from bsip_cli.report.candidates import OF_THE_WEIGHT, analysed, effects_in, is_large
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
@@ -41,15 +24,7 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.verdict import (
-    ALL_FAULTS,
-    CAUSE_UNKNOWN,
-    cause_line,
-    consequences,
-    light_of,
-    unseen,
-)
-from bsip_cli.report.words import METHODS, abbreviations, capital, count, listing, number
+from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -58,44 +33,40 @@ _SEXES = {"M": "man", "F": "woman"}
 _MOST = 2  # causes, and things to do
 _POSES = 8  # among which the one is chosen that is shown
 _SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
-_USABLE = {
-    "fine": "The data may be used: nothing needs to be corrected.",
-    "cause": "The data may be used once what was found is corrected or stated.",
-    "large": "Use no results while the error is so large.",
-    "inconclusive": "Whether the data may be used cannot be said.",
-}
 
 
-def front(record: ParticipantRecord) -> tuple[Block, ...]:
+def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
     light = light_for(record)
     return (
         *portrait(record),
-        Terms((*who(record),)),
-        Heading("Is anything wrong?"),
+        blocks.Terms((*who(record),)),
+        blocks.Heading("Is anything wrong?"),
         replace(light, text="") if record.causes and large_errors(record) else light,
-        Paragraph(_SIGNS, "note"),
+        blocks.Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
-        Heading("How large are the errors?"),
-        Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        Paragraph(
+        blocks.Heading("How large are the errors?"),
+        blocks.Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
+        blocks.Paragraph(
             f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
             f"{ENDS_AT:g} × large. {SOURCES}",
             "note",
         ),
         *_sure(record, light),
-        Heading("Which parameters to use"),
-        Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
-        Heading("What to do next"),
-        Bullets(tuple(to_do(record, light))),
+        blocks.Heading("Which parameters to use"),
+        blocks.Paragraph(
+            use_sentence(record.choice, record.identification, light.state == "large")
+        ),
+        blocks.Heading("What to do next"),
+        blocks.Bullets(tuple(to_do(record, light))),
     )
 
 
-def light_for(record: ParticipantRecord) -> Light:
+def light_for(record: ParticipantRecord) -> blocks.Light:
     """The answer, as `bsip show` prints it too."""
     large = large_errors(record)
-    return light_of(record.diagnosis, record.detection, record.budget, large, record.use())
+    return verdict.light_of(record.diagnosis, record.detection, record.budget, large, record.use())
 
 
 def large_errors(record: ParticipantRecord) -> list[str]:
@@ -134,7 +105,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
 # --- the person ---------------------------------------------------------------------------------
 
 
-def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
+def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The widest pose of the trials with a measured force; nothing without any pose."""
     found = [(trial, pose) for trial in record.trials for pose in _poses(record, trial)]
     if not found:
@@ -145,7 +116,7 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
     shows = f"{trial.label}: left grey, right black, ground force green"
     figure = stick_figure(pose, trial.label)
-    return (Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
+    return (blocks.Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
@@ -161,44 +132,45 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord) -> Iterator[Block]:
+def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """A line per cause that was found, the most probable first."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    lines = tuple(cause_line(cause, everywhere) for cause in record.causes)
+    lines = tuple(verdict.cause_line(cause, everywhere) for cause in record.causes)
     if lines:
-        yield Numbered(lines[:_MOST])
+        yield blocks.Numbered(lines[:_MOST])
     if len(lines) > _MOST:
         more = f"{count(len(lines) - _MOST, 'more finding')} below"
-        yield Links("", ((more, f"#{ALL_FAULTS}"),))
+        yield blocks.Links("", ((more, f"#{verdict.ALL_FAULTS}"),))
 
 
-def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
+def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
     """Of the error, of what was found, of what might have been missed; nothing where no search was
     made."""
     if record.diagnosis is None or record.detection is None:
         return
     said = []
     if light.state == "large":
-        unknown = ", its cause is not known" if CAUSE_UNKNOWN in light.title else ""
+        unknown = ", its cause is not known" if verdict.CAUSE_UNKNOWN in light.title else ""
         said.append(f"That the error is large is certain{unknown}.")
     if any(not is_large(cause) for cause in record.causes):
         said.append("Each fault states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
-    yield Heading("How sure is this?")
-    yield Paragraph(" ".join((*said, unseen(record.detection, record.diagnosis))).rstrip())
+    yield blocks.Heading("How sure is this?")
+    yield blocks.Paragraph(
+        " ".join((*said, verdict.unseen(record.detection, record.diagnosis))).rstrip()
+    )
 
 
-def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
+def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """What makes the error of the table's parameters, as one bar."""
     if record.budget is None:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
-        yield Bar(
-            "What makes the squared error of the forces with a table's parameters (RM)",
-            pieces,
+        yield blocks.Bar(
+            "What makes the squared error of the forces with a table's parameters (RM)", pieces
         )
 
 
@@ -216,12 +188,12 @@ def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...
 # --- what to do ---------------------------------------------------------------------------------
 
 
-def to_do(record: ParticipantRecord, light: Light) -> list[str]:
+def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """Whether the data may be used, and at most two things to do."""
     causes = record.causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
-    said = [_USABLE[light.state], *said]
-    said += consequences(causes[:_MOST], only_actions=True)
+    said = [TEXTS["usable"][light.state], *said]
+    said += verdict.consequences(causes[:_MOST], only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]
@@ -230,9 +202,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
         said.append(f"To learn the cause of finding {k}, {step}.")
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
-        said.append(
-            "Record a movement in which every foot that touches the ground stands on a plate."
-        )
+        said.append(TEXTS["to_do"]["contacts"])
     said += [text for one in large[:1] if (text := _where_large(record, one))]
     if len(said) == 1 and len(rows := record.excitation.query("quantity == 'next'")):
         text = rows["text"].iloc[0]
@@ -243,16 +213,11 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
 def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
     """Where to look for what makes an error large; empty where no recording has it."""
     if yardstick.name == MARKERS:
-        return (
-            "Check that marker set and labels are right: the markers do not fit the body (below)."
-        )
+        return str(TEXTS["to_do"]["markers"])
     fits = {t.label: t.fit for t in record.moving_trials() if t.fit is not None}
     sizes = {label: errors_of([fit], record.use())[yardstick.name] for label, fit in fits.items()}
     known = {label: size for label, size in sizes.items() if np.isfinite(size)}
     if not known:
         return ""
     worst = max(known, key=known.__getitem__)
-    return (
-        f"Look at {worst}, where the {yardstick.in_sentence()} is largest: a foot beside the "
-        "plate, a hand on something, plates or markers out of place, forces that start late?"
-    )
+    return str(TEXTS["to_do"]["forces"]).format(trial=worst, error=yardstick.in_sentence())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -124,10 +124,6 @@ class ParticipantRecord:
         return float((ran or [self.defaults[section]])[0][name])
 
 
-Message = tuple[str, str, str]
-"""Stage, unit, text."""
-
-
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
     """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
     names = [name for name in table["method"].unique() if is_extended(name)]
@@ -175,20 +171,20 @@ _MOST_WARNINGS = 6
 class HowMade:
     """What made many artifacts, without what they share again and again.
 
-    options, versions : name -> all values; files : recordings and the like, name -> SHA-256.
+    messages : stage, unit and text. options, versions : name -> all values; files : recordings and the like, name -> SHA-256.
     """
 
     options: dict[str, set[str]] = field(default_factory=dict)
     versions: dict[str, set[str]] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
-    messages: dict[Message, None] = field(default_factory=dict)
+    messages: dict[tuple[str, str, str], None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, origins: Iterable[Origin]) -> HowMade:
         made = cls()
         for origin in origins:
-            for name, value in _flat(origin.options):
-                made.options.setdefault(name, set()).add(value)
+            for name, value in flat(origin.options):
+                made.options.setdefault(name, set()).add(_as_text(value))
             for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
                 made.versions.setdefault(name, set()).add(version)
             made.files.update(
@@ -220,7 +216,7 @@ def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
         blocks.append(Paragraph(f"{len(said) - _MOST_WARNINGS} more in the artifacts.", "note"))
     if not said:
         blocks.append(Paragraph("No stage had anything to warn of."))
-    shipped = {name: {value} for name, value in _flat(defaults)}
+    shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
     blocks.append(Heading("Options that differ from the shipped ones"))
     if changed:
@@ -235,9 +231,14 @@ def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
     return blocks
 
 
-def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:
+def flat(options: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Entries of nested options as ``section.name``."""
     for name, value in options.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{name}.")
+            yield from flat(value, f"{before}{name}.")
         else:
-            yield f"{before}{name}", value if isinstance(value, str) else json.dumps(value)
+            yield f"{before}{name}", value
+
+
+def _as_text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.report import errors
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
@@ -30,16 +32,9 @@ from bsip_cli.report.effect_words import (
     effect_title,
     separating_recording,
 )
-from bsip_cli.report.errors import (
-    PARAMETERS,
-    REST,
-    UNKNOWN,
-    budget_sentences,
-    found_share,
-    overall_pieces,
-)
 from bsip_cli.report.words import (
     METHODS,
+    TEXTS,
     capital,
     component_label,
     count,
@@ -52,9 +47,7 @@ from bsip_cli.report.words import (
 )
 from bsip_cli.statistics.methods import OM, RM
 
-ALL_FAULTS = "wrong"
-"""Address of the section that has all of them."""
-
+ALL_FAULTS = "wrong"  # address of the section that has all of them
 _NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
@@ -63,9 +56,6 @@ _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
-_OF_THE_LABORATORY = (
-    "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
-)
 CAUSE_UNKNOWN = "cause unknown"
 _UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
 _OR_THE_MASS = ", or the stated mass is wrong"
@@ -76,8 +66,6 @@ NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 class Verdict:
     """All that is said of a diagnosis.
 
-    Attributes
-    ----------
     headline : whether anything is wrong. found : whether anything was.
     causes : a text per cause or group of causes that cannot be distinguished here.
     results : what the causes do to forces and parameters, and where they were looked for.
@@ -91,11 +79,6 @@ class Verdict:
     results: tuple[str, ...]
     advice: tuple[str, ...]
     limits: str
-
-    def paragraphs(self) -> tuple[str, ...]:
-        """Everything, in order."""
-        limits = (self.limits,) if self.limits else ()
-        return (self.headline, *self.causes, *self.results, *self.advice, *limits)
 
 
 def verdict_of(
@@ -117,7 +100,7 @@ def verdict_of(
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
-            *(budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
+            *(errors.budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
             *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
@@ -163,7 +146,7 @@ def light_of(
     if not causes:
         title = "No fault found" if large is None else "Fine: no fault found, no large error"
         return Light("fine", title, nothing)
-    share = np.nan if budget is None else found_share(budget, effects_in(causes))
+    share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
     named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
     title = capital(found) if large is None else f"{capital(found)}; no large error"
@@ -187,11 +170,11 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    parts = () if budget is None or budget.empty else overall_pieces(budget, found)
+    parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
     most = max(parts, key=lambda one: one.share, default=None)
-    if most is None or most.label in (UNKNOWN, REST):
+    if most is None or most.label in (errors.UNKNOWN, errors.REST):
         return f", {CAUSE_UNKNOWN}"
-    if use == OM and PARAMETERS in most.label:
+    if use == OM and errors.PARAMETERS in most.label:
         return " even with identified parameters"
     how = "most" if most.share > 50.0 else "the largest part"
     return f", {how} of it {most.label} ({number(most.share, 0)} %)"
@@ -250,7 +233,7 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     for k, (one, place) in enumerate(zip(cause, own, strict=True)):
         words = probability_words(one.probability)
         probability = f", probability {words}" if words else ""
-        members.append(f"({_letter(k)}) {one.in_words()}{place}{probability}")
+        members.append(f"({ascii_lowercase[k]}) {one.in_words()}{place}{probability}")
     steps = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         steps = f"weigh the person on a scale; {steps}"
@@ -258,10 +241,6 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
         f"{sure}{' ' if sure else ''}To distinguish them: {steps}."
     )
-
-
-def _letter(number: int) -> str:
-    return chr(ord("a") + number)
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
@@ -292,7 +271,7 @@ def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str
         return ""
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
-    which = f"({_letter(position)}) " if len(cause) > 1 else ""
+    which = f"({ascii_lowercase[position]}) " if len(cause) > 1 else ""
     perhaps = "" if low > 0 else ": too few seconds to be sure"
     return (
         f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared difference in "
@@ -414,7 +393,11 @@ def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
     known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
-    lab = ((_OF_THE_LABORATORY, ""),) if all(one.scope == "laboratory" for one in cause) else ()
+    lab = (
+        ((TEXTS["of_the_laboratory"], ""),)
+        if all(one.scope == "laboratory" for one in cause)
+        else ()
+    )
     return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 
 

@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from bsip_cli.segments import in_words
-from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
+from bsip_cli.statistics.methods import OM
 
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 MISSING = "–"
 EXTENDED = f"{OM}+causes"  # how reports call OM with every named cause in the model
-METHODS = {
-    MEASURED: "measured",
-    RM: "RM (table)",
-    RM_MASS: "RM+mass (table times one number)",
-    OM: "OM (identified)",
-    EXTENDED: "OM with the causes found",
-}
-COMPONENTS = {
-    "cop_ap": "COP, anterior-posterior",
-    "cop_ml": "COP, medio-lateral",
-    "grf_vertical": "vertical ground force",
-    "fx": "force, lab X",
-    "fy": "force, lab Y",
-    "fz": "force, lab Z (up)",
-    "mx": "moment, lab X",
-    "my": "moment, lab Y",
-    "mz": "moment, lab Z (up)",
-}
-ROLES = {
-    "static": "calibrates the skeleton",
-    "sequence": "identifies the parameters",
-    "validation": "validates",
-}
+METHODS: dict[str, str] = TEXTS["methods"]
+COMPONENTS: dict[str, str] = TEXTS["components"]
+ROLES: dict[str, str] = TEXTS["roles"]
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _STEM = re.compile(
     r"sub-[A-Za-z0-9]+(_ses-(?P<session>[A-Za-z0-9]+))?"
@@ -109,20 +92,10 @@ def task_of(stem: str) -> str:
     return match["task"] if match else stem
 
 
-_ABBREVIATIONS = {
-    "CMJ": "countermovement jump",
-    "DJ": "drop jump",
-    "SJ": "squat jump",
-    "STS": "sit to stand",
-    "TUG": "timed up and go",
-}
-"""Usual names of tasks that people may not know."""
-
-
 def abbreviations(tasks: Iterable[str]) -> str:
     """``DJ: drop jump; STS: sit to stand``, of those in names of tasks; empty without any."""
     found = {short for task in tasks for short in re.findall(r"[A-Z]{2,3}(?![A-Z])", task)}
-    return "; ".join(f"{x}: {words}" for x, words in _ABBREVIATIONS.items() if x in found)
+    return "; ".join(f"{x}: {words}" for x, words in TEXTS["abbreviations"].items() if x in found)
 
 
 def labelled(text: str) -> str:
@@ -140,9 +113,7 @@ def true_minus(text: str) -> str:
     return re.sub(r"(?<![\w.)])-(?=\d)", "−", text)
 
 
-def segment_label(segment: str) -> str:
-    """``left upper arm`` for upper_arm_l."""
-    return in_words(segment)
+segment_label = in_words  # ``left upper arm`` for upper_arm_l
 
 
 def component_label(component: str) -> str:

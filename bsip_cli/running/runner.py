@@ -15,18 +15,9 @@ from typing import Literal
 
 import pandas as pd
 
+from bsip_cli import errors
 from bsip_cli.artifacts import remove, remove_unfinished, write_artifact, write_bytes
 from bsip_cli.config import Config
-from bsip_cli.errors import (
-    BadDataError,
-    BsipError,
-    NotWritableError,
-    NumericalError,
-    UsageError,
-    not_readable,
-    not_writable,
-    printable,
-)
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer
 from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
@@ -142,7 +133,7 @@ def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]
 
 def _tidy(task: _Task) -> None:
     """Take away what a killed process left half written, unless another bsip is at it by now."""
-    with suppress(UsageError, OSError), held_alone(task.folder):
+    with suppress(errors.UsageError, OSError), held_alone(task.folder):
         pass  # what cannot be taken away now, the next run takes
 
 
@@ -164,15 +155,15 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
             kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
             if fingerprints.kept_in(task.folder) != kept:
                 write_bytes(task.folder / fingerprints.NAME, kept)
-    except BsipError as error:
+    except errors.BsipError as error:
         yield task.name, _stopped(task, error)
     except OSError as error:
-        yield task.name, _stopped(task, not_readable(error))
+        yield task.name, _stopped(task, errors.not_readable(error))
     except Exception as error:  # noqa: BLE001  a bug outside of the units stops one task only
         yield task.name, _bug(task.stages[0].name, task.name, error)
 
 
-def _stopped(task: _Task, error: BsipError) -> Outcome:
+def _stopped(task: _Task, error: errors.BsipError) -> Outcome:
     sentence = str(error) if task.name in str(error) else f"{task.name}: {error}"
     return Outcome(task.stages[0].name, task.name, "refused", (sentence,), error.exit_code)
 
@@ -233,12 +224,11 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
 
 
 def _left_out(task: _Task, left_out: Mapping[str, str]) -> Iterator[Outcome]:
-    reasons: dict[str, list[str]] = {}
-    for name, why in left_out.items():
-        reasons.setdefault(why, []).append(name)
-    for why, names in reasons.items():
+    stage, code = task.stages[0].name, errors.BadDataError.exit_code
+    for why in dict.fromkeys(left_out.values()):
+        names = [name for name, its_own in left_out.items() if its_own == why]
         said = f"{listed(names)}: left out of the group, since {why}; run `bsip run` first"
-        yield Outcome(task.stages[0].name, "group", "refused", (said,), BadDataError.exit_code)
+        yield Outcome(stage, "group", "refused", (said,), code)
 
 
 def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
@@ -263,10 +253,10 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         said = [f"{changed}: made again" for changed in was_changed(unit)]
         stage.run(unit)
         remove(unit.refusal_path())
-    except BsipError as error:
+    except errors.BsipError as error:
         return _refused(unit, error)
     except OSError as error:
-        return _refused(unit, not_readable(error))
+        return _refused(unit, errors.not_readable(error))
     except Exception as error:  # noqa: BLE001  a bug in one unit leaves the others standing
         bug = _bug(stage.name, unit.name, error)
         _write_refusal(unit, "bug", bug.sentences[0].splitlines()[0])
@@ -275,18 +265,18 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
     return Outcome(stage.name, unit.name, "done", (*said, *unit.messages), 0, seconds, reads)
 
 
-def _refused(unit: Unit, error: BsipError) -> Outcome:
+def _refused(unit: Unit, error: errors.BsipError) -> Outcome:
     """Write down what is wrong with the data; say what is wrong, after the unit's warnings."""
     end_if_asked()
-    if not isinstance(error, UsageError):
+    if not isinstance(error, errors.UsageError):
         try:
-            kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
+            kind = "numerical failure" if isinstance(error, errors.NumericalError) else "bad data"
             _write_refusal(unit, kind, str(error))
-        except NotWritableError as closed:
+        except errors.NotWritableError as closed:
             return _refused(unit, closed)
     sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
     said = (*unit.messages, sentence)
-    state: State = "unwritten" if isinstance(error, NotWritableError) else "refused"
+    state: State = "unwritten" if isinstance(error, errors.NotWritableError) else "refused"
     return Outcome(unit.stage.name, unit.name, state, said, error.exit_code)
 
 
@@ -320,7 +310,7 @@ def _bug(stage: str, name: str, error: Exception) -> Outcome:
     if isinstance(error, MemoryError):
         return Outcome(stage, name, "bug", (f"{name}: {_SHORT_OF_MEMORY}",), 1)
     trace = "".join(traceback.format_exception(error)).strip()
-    found = f"a bug in bsip: {type(error).__name__}: {printable(str(error))}"
+    found = f"a bug in bsip: {type(error).__name__}: {errors.printable(str(error))}"
     return Outcome(stage, name, "bug", (f"{name}: {found}\n{trace}",), 1)
 
 
@@ -339,7 +329,7 @@ def held_alone(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         handle = (folder / LOCK).open("a")
     except OSError as error:
-        raise not_writable(folder, error) from None
+        raise errors.not_writable(folder, error) from None
     with handle:
         _lock(handle.fileno(), folder)
         remove_unfinished(folder)
@@ -350,10 +340,10 @@ def _lock(descriptor: int, folder: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise UsageError(
+        raise errors.UsageError(
             "another bsip is writing there",
             file=folder,
             remedy="wait until it has ended, and run again",
         ) from None
     except OSError as error:
-        raise not_writable(folder, error) from None
+        raise errors.not_writable(folder, error) from None

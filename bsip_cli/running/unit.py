@@ -16,14 +16,7 @@ from typing import Any
 
 import pandas as pd
 
-from bsip_cli import __version__
-from bsip_cli.artifacts import (
-    Rows,
-    read_artifact,
-    read_header,
-    write_artifact,
-    write_artifact_in_parts,
-)
+from bsip_cli import __version__, artifacts
 from bsip_cli.config import Config, Load, load_config, shipped
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.fingerprints import file_hash
@@ -276,13 +269,15 @@ class Unit:
         **wanted: Collection[str],
     ) -> pd.DataFrame:
         """An artifact, or those of its rows with the wanted values in text columns."""
-        return read_artifact(self.path(kind, trial, participant), kind, **wanted)
+        return artifacts.read_artifact(self.path(kind, trial, participant), kind, **wanted)
 
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> dict:
         """What the producing stage said of its result as a whole."""
-        return read_header(self.path(kind, trial, participant), kind)["provenance"]["facts"]
+        return artifacts.read_header(self.path(kind, trial, participant), kind)["provenance"][
+            "facts"
+        ]
 
     def said_before(self, kind: str) -> dict:
         """Facts of what the unit has written last; empty where that cannot be read."""
@@ -291,14 +286,16 @@ class Unit:
         except BadDataError:
             return {}
 
-    def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
-        write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
+    def write(self, kind: str, frame: artifacts.Rows, facts: dict | None = None) -> None:
+        artifacts.write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
 
     def write_in_parts(
         self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
     ) -> None:
         """Write what does not fit into memory; the facts are known after the last part."""
-        write_artifact_in_parts(self.path(kind), kind, parts, lambda: self._notes(facts()))
+        artifacts.write_artifact_in_parts(
+            self.path(kind), kind, parts, lambda: self._notes(facts())
+        )
 
     def _notes(self, facts: dict) -> dict:
         return {"made_by": self.made_by, "messages": list(self.messages), "facts": facts}
@@ -309,11 +306,11 @@ class Unit:
         What made the artifact stays what it was: its maker need not work again.
         """
         path = self.path(kind)
-        notes = read_header(path, kind)["provenance"]
-        made = read_artifact(path, kind).iloc[: notes.get("rows_made")]
+        notes = artifacts.read_header(path, kind)["provenance"]
+        made = artifacts.read_artifact(path, kind).iloc[: notes.get("rows_made")]
         notes |= {"amended_by": self.made_by, "rows_made": len(made)}
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        write_artifact(path, kind, whole, notes)
+        artifacts.write_artifact(path, kind, whole, notes)
 
 
 def _owner(participant: Participant | None) -> str:

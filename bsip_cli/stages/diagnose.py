@@ -73,7 +73,11 @@ def run(unit: Unit) -> None:
             limits = known.limits(limits)
     findings = (*(one.held.finding(one.trial.stem) for one in trials if one.held), *findings)
     budget, large = error_budget(unit, trials, facts["causes"])
-    findings = (*_not_reported_yet(findings, large), *findings)
+    # large errors, less the trials already reported with an error of unknown cause
+    unknown = [f for f in findings if f.effect == UNEXPLAINED and f.verdict == "named"]
+    told = {trial for one in unknown for trial in one.trials}
+    left = [(one, tuple(t for t in one.trials if t not in told)) for one in large]
+    findings = (*(replace(one, trials=trials) for one, trials in left if trials), *findings)
     if not trials:
         unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")
     names = dict.fromkeys(
@@ -124,14 +128,6 @@ def _of_markers(
             yield shaken_finding(scene, one.shaken, stem)
         if one.moves and stem not in bent:
             yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
-
-
-def _not_reported_yet(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
-    """Large errors, less the trials already reported with an error of unknown cause."""
-    named = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
-    for one in large:
-        if trials := tuple(t for t in one.trials if t not in named):
-            yield replace(one, trials=trials)
 
 
 # --- the error budget -----------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
+from bsip_cli.diagnosis import support
 from bsip_cli.diagnosis.error_budget import Ground, ground_of
 from bsip_cli.diagnosis.error_model import TrialErrors
 from bsip_cli.diagnosis.error_terms import FAULT, Term, error_terms, noise_of_instruments
@@ -19,16 +20,6 @@ from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
-from bsip_cli.diagnosis.support import (
-    HANDS,
-    LIGHTER,
-    Support,
-    agreed_share,
-    is_noticed,
-    loaded_plate,
-    stated_mass_findings,
-    weight_share,
-)
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.markers import BEFORE_S
 from bsip_cli.effects.scene import Scene
@@ -60,7 +51,7 @@ class Diagnosed:
     scene: Scene
     errors: TrialErrors
     ground: Ground
-    held: Support | None
+    held: support.Support | None
     slips: tuple[Proof, ...]
     shaken: tuple[Proof, ...]
 
@@ -105,16 +96,16 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     sd = stated_sd(unit)
     standing = [(t, s) for t, s in scenes if t.role == STATIC][:1]
     if standing:
-        share, manner = weight_share(standing[0][1]), "in quiet stance"
+        share, manner = support.weight_share(standing[0][1]), "in quiet stance"
     else:
         standing, manner = list(scenes), "in motion"
-        share = agreed_share([s for _, s in scenes], sd) or 0.0
-    if not is_noticed(share, sd):
+        share = support.agreed_share([s for _, s in scenes], sd) or 0.0
+    if not support.is_noticed(share, sd):
         return Weighed(scenes, prior, 0.0, ())
-    plate = loaded_plate([s for _, s in standing])
+    plate = support.loaded_plate([s for _, s in standing])
     stems = tuple(t.stem for t, _ in standing)
     mass_kg = scenes[0][1].mass_kg
-    findings = stated_mass_findings(share, mass_kg, sd, plate, stems, manner)
+    findings = support.stated_mass_findings(share, mass_kg, sd, plate, stems, manner)
     as_read = prior_of(unit, person, share)
     heavier = tuple((t, replace(s, phi=s.phi + as_read.phi - prior.phi)) for t, s in scenes)
     return Weighed(heavier, as_read, share, findings)
@@ -184,7 +175,7 @@ def diagnosed(
         fewer, filter_.reference_m, marker_noise_m, scene.rate_hz, options.cutoff_hz
     )
     errors = TrialErrors(trial.stem, filter_, residual, tuple(terms), noise)
-    held = None if contact is None else Support(**contact)
+    held = None if contact is None else support.Support(**contact)
     return Diagnosed(trial, scene, errors, ground, held, *markers)
 
 
@@ -204,8 +195,8 @@ def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator
 
 def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
     """A constant force on each hand, of the size from which on it is reported."""
-    force = LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
-    for hand in HANDS:
+    force = support.LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
+    for hand in support.HANDS:
         place = scene.point(hand, scene.centre_of(hand)).position_m
         arm = np.cross(place[:, None], force).swapaxes(1, 2)
         columns = np.concatenate([np.broadcast_to(force, arm.shape), arm], axis=1)

@@ -184,7 +184,11 @@ def run_trial(unit: Unit) -> None:
     measured = unit.read("wrench")
     judgement = judgement_of(unit, unit.read("kinematics"), measured)
     blocks = blocks_of(unit, unit.own_trial.stem)
-    scene, parameters = _scene(unit, person, extended)
+    # the body for which the causes were sized, and those of OM and of each extended model
+    methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
+    scene = scene_of(unit, person, body_as_sized(unit, phi[:, methods.index(RM)]))
+    carried = phi + load_phi(unit, person)[:, None]
+    parameters = dict(zip(methods, carried.T, strict=True))
     fold = blocks.fold_of(judgement.times_s)
     raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(parameters[OM])}
     for place, k in enumerate(own):
@@ -206,17 +210,6 @@ def run_trial(unit: Unit) -> None:
     }
     unit.write("gain", rows, facts={"method": last, "data": judgement.data, "blocks": sums})
     unit.write("corrected-wrench", _corrected(scene, measured, [causes[k] for k in own]))
-
-
-def _scene(
-    unit: Unit, person: Person, extended: pd.DataFrame
-) -> tuple[Scene, dict[str, np.ndarray]]:
-    """The trial with the body for which the causes were sized; parameters (10 n,) of OM and of
-    each extended model, loads included."""
-    methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
-    scene = scene_of(unit, person, body_as_sized(unit, phi[:, methods.index(RM)]))
-    carried = phi + load_phi(unit, person)[:, None]
-    return scene, dict(zip(methods, carried.T, strict=True))
 
 
 def _errors(

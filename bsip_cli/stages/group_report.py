@@ -9,15 +9,8 @@ import pandas as pd
 
 from bsip_cli.artifacts import file_rows
 from bsip_cli.report.blocks import Light
+from bsip_cli.report.cohort import record
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
-from bsip_cli.report.cohort.record import (
-    CohortRecord,
-    Member,
-    Searched,
-    ratios_of,
-    searched,
-    yardsticks_of,
-)
 from bsip_cli.report.records import HowMade, Origin
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
@@ -37,14 +30,11 @@ def run(unit: Unit) -> None:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def record_of(unit: Unit) -> CohortRecord:
+def record_of(unit: Unit) -> record.CohortRecord:
     """Everything that is there of the whole study."""
     facts = unit.facts("values")
-    options = unit.config.stats
-    criteria, compared = (
-        Criteria(options.alpha, options.equivalence_percent),
-        unit.read("comparisons"),
-    )
+    criteria = Criteria(unit.config.stats.alpha, unit.config.stats.equivalence_percent)
+    compared = unit.read("comparisons")
 
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
@@ -52,13 +42,13 @@ def record_of(unit: Unit) -> CohortRecord:
     choices = {one.id: _read(unit, "choice", one) for one in unit.study.participants}
     # the table's parameters where nothing was chosen
     use = {name: str(rows["use"].iloc[0]) if len(rows) else RM for name, rows in choices.items()}
-    errors = yardsticks_of(read, use)
-    return CohortRecord(
+    errors = record.yardsticks_of(read, use)
+    return record.CohortRecord(
         members=tuple(
             _member(unit, person, use[person.id], errors.get(person.id, {}))
             for person in unit.study.participants
         ),
-        ratios=ratios_of(read),
+        ratios=record.ratios_of(read),
         tables=build_tables(compared, criteria, facts["fitted_on"], facts["missing"]),
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(
@@ -78,7 +68,9 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
-def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]) -> Member:
+def _member(
+    unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]
+) -> record.Member:
     has_page = unit.path("report-files", participant=participant).exists()
     facts = unit.facts("report-files", participant=participant) if has_page else {}
     identified = _read(unit, "identification", participant)
@@ -89,7 +81,7 @@ def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str,
         kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()
     }
-    return Member(
+    return record.Member(
         participant.id,
         first["person"],
         first["identification"],
@@ -102,12 +94,12 @@ def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str,
     )
 
 
-def _searched(unit: Unit, participant: Participant) -> Searched | None:
+def _searched(unit: Unit, participant: Participant) -> record.Searched | None:
     if not unit.path("overall-diagnosis", participant=participant).exists():
         return None
     diagnosis = unit.read("overall-diagnosis", participant=participant)
     facts = unit.facts("overall-diagnosis", participant=participant)
-    return searched(participant.id, diagnosis, facts)
+    return record.searched(participant.id, diagnosis, facts)
 
 
 def _origins(unit: Unit) -> Iterator[Origin]:

@@ -75,12 +75,15 @@ def recordings_of(
 
     changes : of a trial's stem, the part (N, 6) of its measured wrench that is not the person's.
     """
-    recordings, blocks = [], []
+    recordings, blocks, options = [], [], unit.config.identify
     for trial in trials:
         kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
         times = kinematics["time_s"].to_numpy()
         rate = 1.0 / float(np.median(np.diff(times)))
-        use = usable_frames(unit, trial) & ~_held_out(unit, times)
+        # the blocks that are kept out are spread evenly over the trial
+        share, block = options.hold_out_fraction, (times - times[0]) // options.block_s
+        held_out = np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
+        use = usable_frames(unit, trial) & ~held_out
         if not use.any():
             unit.say(f"{trial.stem} has no frame with all contacts on plates; left out")
             continue
@@ -102,14 +105,6 @@ def recordings_of(
 def duration_s(recordings: list[Recording]) -> float:
     """Time that may identify [s]."""
     return sum(float(r.use.sum()) / r.rate_hz for r in recordings)
-
-
-def _held_out(unit: Unit, times: np.ndarray) -> np.ndarray:
-    """(N,) frames of the blocks that are kept out, spread evenly over the trial."""
-    options = unit.config.identify
-    block = ((times - times[0]) // options.block_s).astype(int)
-    share = options.hold_out_fraction
-    return np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
 
 
 def estimate_by(estimator: str, problem: Problem) -> Estimate:

@@ -16,18 +16,10 @@ from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.identification import uncertainty
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.problem import Estimate, Problem, Recording
-from bsip_cli.identification.uncertainty import (
-    RARE,
-    Excitation,
-    excitation,
-    in_words,
-    rarity_of,
-    readable,
-    root_of,
-)
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names, spread_names
 from bsip_cli.segments import in_words as segment_in_words
@@ -77,7 +69,9 @@ def run(unit: Unit) -> None:
     first, *others = unit.config.identify.estimators
     estimators = {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
     estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
-    results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
+    results = {
+        method: uncertainty.readable(estimate, prior) for method, estimate in estimates.items()
+    }
     tables = [regression.drop(columns=["note", *spread_names()])]
     for method, result in results.items():
         unit.say(f"{method}: {estimates[method].note}")
@@ -88,10 +82,12 @@ def run(unit: Unit) -> None:
     made: dict = {"reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist()}
     made["loads"] = {trial.stem: loads_record(unit, trial) for trial in trials}
     unit.write("bsip", pd.concat(tables, ignore_index=True), made)
-    roots = {method: root_of(estimate.covariance) for method, estimate in estimates.items()}
+    roots = {
+        method: uncertainty.root_of(estimate.covariance) for method, estimate in estimates.items()
+    }
     unit.write("covariance", _covariance_table(skeleton, {RM: prior.root} | roots))
     unit.write("base-parameters", _base_table(skeleton, problem))
-    found = excitation(problem)
+    found = uncertainty.excitation(problem)
     unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
     summary = _summary(problem, found, estimates, estimators, blocks).assign(**rarity)
     unit.write("identification", summary[column_names("identification")], facts)
@@ -165,7 +161,7 @@ def _rarity(
         if method == RM_MASS:
             rows.append((np.nan, np.nan, False, ""))
             continue
-        found = rarity_of(problem.prior, estimate)
+        found = uncertainty.rarity_of(problem.prior, estimate)
         kg, table_kg = estimate.phi[::10], problem.prior.phi[::10]
         words = ", ".join(  # of the segments that make half of the distance
             f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
@@ -176,7 +172,7 @@ def _rarity(
         if found.is_rare:
             unit.say(
                 f"do not use {method}: a body like this is rarer than 1 in "
-                f"{1 / RARE:.0f} people, most by {words}"
+                f"{1 / uncertainty.RARE:.0f} people, most by {words}"
             )
     return pd.DataFrame(rows, columns=["distance", "probability", "rare", "farthest"])
 
@@ -211,12 +207,12 @@ def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
 
 
 def _excitation_table(
-    person: Person, problem: Problem, found: Excitation, share: np.ndarray
+    person: Person, problem: Problem, found: uncertainty.Excitation, share: np.ndarray
 ) -> pd.DataFrame:
     """``share`` (n, 10) are OM's data shares."""
     names = person.skeleton.body_names
     words = [
-        "no markers, no data: the table's values" if fixed else in_words(own)
+        "no markers, no data: the table's values" if fixed else uncertainty.in_words(own)
         for fixed, own in zip(problem.prior.fixed, share, strict=True)
     ]
     rows = [("condition_number", "", found.condition_number, "1", "", "")]
@@ -245,7 +241,7 @@ def _excitation_table(
 
 def _summary(
     problem: Problem,
-    found: Excitation,
+    found: uncertainty.Excitation,
     estimates: dict[str, Estimate],
     estimators: dict[str, str],
     blocks: pd.DataFrame,

@@ -62,7 +62,10 @@ def run(unit: Unit) -> None:
         findings += zeroed
     segment = {marker.label: marker.segment for marker in marker_set.markers}
     segments = [segment[name] for name in names]
-    filled = _fill(unit, recording, [match.index[name] for name in names], segments)
+    positions = recording.markers_m[:, [match.index[name] for name in names]]
+    groups = [np.flatnonzero(np.equal(segments, one)).tolist() for one in dict.fromkeys(segments)]
+    longest = unit.config.ingest.max_gap_s, unit.config.ingest.max_rigid_gap_s
+    filled = fill_gaps(positions, recording.marker_rate_hz, groups, *longest)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
     stated = asdict(recording.stated)
@@ -102,9 +105,7 @@ def run(unit: Unit) -> None:
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
-def _without_zero(
-    recording: Recording,
-) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
+def _without_zero(recording: Recording) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
     """The plates without what they read without load, and that, (6,) by plate: N and N m about the
     world's origin."""
     done, rate_hz = [], recording.analog_rate_hz
@@ -142,15 +143,6 @@ def _require(unit: Unit, names: list[str], recording: Recording) -> None:
             expected="the labels of the marker set",
             remedy="name the right marker set in study.toml",
         )
-
-
-def _fill(
-    unit: Unit, recording: Recording, columns: list[int], segments: list[str]
-) -> FilledMarkers:
-    positions, options = recording.markers_m[:, columns], unit.config.ingest
-    groups = [np.flatnonzero(np.equal(segments, one)).tolist() for one in dict.fromkeys(segments)]
-    longest = options.max_gap_s, options.max_rigid_gap_s
-    return fill_gaps(positions, recording.marker_rate_hz, groups, *longest)
 
 
 def _contacts(

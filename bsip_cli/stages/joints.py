@@ -42,13 +42,7 @@ from bsip_cli.stages.frames import (
     person_of,
 )
 from bsip_cli.stages.reconstruct import parameters_of
-from bsip_cli.stages.trial_scene import (
-    body_as_sized,
-    causes_of,
-    outline,
-    plate_names,
-    scene_of,
-)
+from bsip_cli.stages.trial_scene import body_as_sized, causes_of, outline, plate_names, scene_of
 from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated

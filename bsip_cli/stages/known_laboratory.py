@@ -84,11 +84,8 @@ class Known:
             return ""
         _, parameter, (mean, sd) = max(known, key=itemgetter(0))
         low, high = mean - Z95 * sd, mean + Z95 * sd
-        how = (
-            "also show it"
-            if low * high > 0 and mean * sizes[parameter.name] > 0
-            else "leave it open"
-        )
+        is_shown = low * high > 0 and mean * sizes[parameter.name] > 0
+        how = "also show it" if is_shown else "leave it open"
         factor, unit = readable_unit(parameter.name, parameter.unit)
         ends = [factor * parameter.typical * x for x in (mean, low, high)]
         digits = digits_of(ends[2] - ends[1])

@@ -14,19 +14,9 @@ from zlib import crc32
 import numpy as np
 import pandas as pd
 
+from bsip_cli.diagnosis import laboratory_search
 from bsip_cli.diagnosis.findings import Number, interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
-from bsip_cli.diagnosis.laboratory_search import (
-    Cause,
-    Deviation,
-    Laboratory,
-    Size,
-    Verdict,
-    causes_of,
-    deviations_of,
-    laboratory_of,
-    verdicts_of,
-)
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Information
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
@@ -65,7 +55,7 @@ def run(unit: Unit) -> None:
     rows: list[dict] = []
     laboratories = _laboratories(list(_sessions(unit)))
     sums: list[dict] = []
-    found: dict[str, Laboratory] = {}
+    found: dict[str, laboratory_search.Laboratory] = {}
     for number, sessions in enumerate(laboratories, start=1):
         lab = found[str(number)] = _fitted(unit, sessions)
         rows += _rows(unit, str(number), sessions, lab)
@@ -96,7 +86,7 @@ def run(unit: Unit) -> None:
     unit.write("laboratory-sums", pd.DataFrame(sums, columns=columns), facts)
 
 
-def _answer(unit: Unit, found: Mapping[str, Laboratory]) -> dict:
+def _answer(unit: Unit, found: Mapping[str, laboratory_search.Laboratory]) -> dict:
     """Mean and standard deviation of every number [typical]; those of before where none has moved
     by a tenth of its standard deviation: what was made with them stays true."""
     now = {}
@@ -147,11 +137,10 @@ def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
     """Sessions whose plates have the same names and places, the most first."""
     found: list[list[_Session]] = []
     for one in sessions:
-        mine = [lab for lab in found if _alike(lab[0].plates, one.plates)]
-        if mine:
-            mine[0].append(one)
-        else:
-            found.append([one])
+        mine = next((lab for lab in found if _alike(lab[0].plates, one.plates)), None)
+        if mine is None:
+            found.append(mine := [])
+        mine.append(one)
     return sorted(found, key=len, reverse=True)
 
 
@@ -163,7 +152,7 @@ def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
 # --- rows ---------------------------------------------------------------------------------------
 
 
-def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
+def _fitted(unit: Unit, sessions: Sequence[_Session]) -> laboratory_search.Laboratory:
     mine = unit.config.laboratory
     mean_s, sd_s = np.mean([one.moments_s for one in sessions], axis=0).tolist()
     persons = persons_of(
@@ -174,16 +163,16 @@ def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
         (mean_s, sd_s),
     )
     centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
-    causes = causes_of(persons, centres)
-    return laboratory_of(persons, causes, unit.config.diagnosis.fault_prior_odds)
+    causes = laboratory_search.causes_of(persons, centres)
+    return laboratory_search.laboratory_of(persons, causes, unit.config.diagnosis.fault_prior_odds)
 
 
 def _rows(
-    unit: Unit, laboratory: str, sessions: Sequence[_Session], lab: Laboratory
+    unit: Unit, laboratory: str, sessions: Sequence[_Session], lab: laboratory_search.Laboratory
 ) -> Iterator[dict]:
     options, mine = unit.config.diagnosis, unit.config.laboratory
     rng = np.random.default_rng(crc32(unit.name.encode()))
-    for one in verdicts_of(lab, options.named_from, rng):
+    for one in laboratory_search.verdicts_of(lab, options.named_from, rng):
         counts = _counts(sessions, one.cause)
         sentence = _sentence(one.cause, one.sizes, one.said, one.probability, counts)
         cells = {"sentence": sentence, "laboratory": laboratory, "scope": "laboratory"}
@@ -192,7 +181,7 @@ def _rows(
     dated = [(dates[s.name], k) for k, s in enumerate(sessions) if s.name in dates]
     order = [k for _, k in sorted(dated)]
     odds, named_from = options.fault_prior_odds, options.named_from
-    for deviation in deviations_of(lab, odds, named_from, order, rng):
+    for deviation in laboratory_search.deviations_of(lab, odds, named_from, order, rng):
         them = [sessions[k] for k in deviation.sessions]
         who = them[0].name if len(them) == 1 else ""
         where = f"in {who}" if who else f"from {them[0].name} on"
@@ -207,7 +196,9 @@ def _rows(
 
 
 def _rows_of(
-    found: Verdict | Deviation, counts: tuple[int, int], cells: Mapping[str, str]
+    found: laboratory_search.Verdict | laboratory_search.Deviation,
+    counts: tuple[int, int],
+    cells: Mapping[str, str],
 ) -> Iterator[dict]:
     """One for each number of a cause; counts : persons and trials that show it."""
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
@@ -225,7 +216,7 @@ def _row(key: tuple[str, str, str], **cells: object) -> dict:
     return dict(zip(("effect", "target", "parameter"), key, strict=True)) | empty | cells
 
 
-def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
+def _counts(sessions: Sequence[_Session], cause: laboratory_search.Cause) -> tuple[int, int]:
     """Persons and trials that show a cause at its plate, or at any for all plates."""
     plate, *channel = cause.target.split(" ")
     persons, trials = set(), 0
@@ -244,11 +235,11 @@ def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
 # --- words --------------------------------------------------------------------------------------
 
 
-def _effect(cause: Cause) -> Effect:
+def _effect(cause: laboratory_search.Cause) -> Effect:
     return STATED_MASS if cause.effect == STATED_MASS.name else EFFECTS[cause.effect]
 
 
-def _words(cause: Cause, sizes: Sequence[Size]) -> str:
+def _words(cause: laboratory_search.Cause, sizes: Sequence[laboratory_search.Size]) -> str:
     values = np.array([one.value for one in sizes])
     numbers = tuple(
         Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in sizes
@@ -257,7 +248,11 @@ def _words(cause: Cause, sizes: Sequence[Size]) -> str:
 
 
 def _sentence(
-    cause: Cause, sizes: Sequence[Size], said: str, probability: float, counts: tuple[int, int]
+    cause: laboratory_search.Cause,
+    sizes: Sequence[laboratory_search.Size],
+    said: str,
+    probability: float,
+    counts: tuple[int, int],
 ) -> str:
     words, remedy = _words(cause, sizes), _effect(cause).remedy
     people, recordings = (

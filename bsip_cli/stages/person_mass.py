@@ -78,9 +78,9 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
         note = f"mass is not known: put mass_kg into participants.tsv, because {measured.reason}"
         unit.say(note)
         return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
-    vague = (
-        measured if measured.is_known else measured_mass(intervals, VAGUE_PERCENT, static=static)
-    )
+    vague = measured
+    if not measured.is_known:
+        vague = measured_mass(intervals, VAGUE_PERCENT, static=static)
     comparison = compared(unit, stated, vague, 0.0, height_m)
     if stated.source != TABLE:
         unit.say(f"mass {stated.mass_kg:.2f} kg taken from {stated.source}")

@@ -52,10 +52,8 @@ def run(unit: Unit) -> None:
     compared = over_the_same_frames(signals)
     unit.write("fit", fit_rows(judgement, compared))
     unit.write("correlation-difference", _correlations(compared, judgement.judged))
-    rate, spans = (
-        1.0 / float(np.median(np.diff(judgement.times_s))),
-        valid_intervals(judgement.judged),
-    )
+    rate = 1.0 / float(np.median(np.diff(judgement.times_s)))
+    spans = valid_intervals(judgement.judged)
     sway = [
         {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
         for name, one in compared.items()

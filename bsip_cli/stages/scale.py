@@ -66,7 +66,10 @@ def run(unit: Unit) -> None:
     ahead = calibration.anterior
     row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
     row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
-    row |= {"height_note": _height_note(recorded, height_m)}
+    statures = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
+    # how the markers' height differs from the stated one, which ingest has said
+    fault = statures.against(height_m) if statures is not None and height_m is not None else None
+    row |= {"height_note": "; ".join((fault[0], fault[2])) if fault else ""}
     row |= {"anterior_x": ahead[0], "anterior_y": ahead[1]}
     row |= {"calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m()}
     facts = {"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m}
@@ -82,13 +85,6 @@ def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
             unit.say(f"height {height_m:.2f} m, as {one.trial.stem} states it")
             return float(height_m)
     return None
-
-
-def _height_note(recorded: list[_Recorded], stated_m: float | None) -> str:
-    """Empty, or how the markers' height differs from the stated one, which ingest has said."""
-    statures = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
-    fault = statures.against(stated_m) if statures is not None and stated_m is not None else None
-    return "; ".join((fault[0], fault[2])) if fault else ""
 
 
 def _doubt(unit: Unit, doubts: list[Doubt]) -> None:

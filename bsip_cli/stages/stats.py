@@ -180,7 +180,7 @@ class _Cohort:
             rows = self._unit.read("values", table=[table], variable=[variable])
             tests += tests_of((Value(*row) for row in rows.itertuples(index=False)), criteria)
         tests.sort(key=lambda test: places[line_of(test.topic)])
-        found = with_holm([*tests, *self._tests.comparisons(options.alpha)])
+        found = with_holm([*tests, *self._tests.comparisons(criteria.alpha)])
         return [test.as_row() for test in found]
 
 
@@ -281,10 +281,8 @@ def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
 
 def run_tables(unit: Unit) -> None:
     options, facts = unit.config.stats, unit.facts("values")
-    criteria, compared = (
-        Criteria(options.alpha, options.equivalence_percent),
-        unit.read("comparisons"),
-    )
+    criteria = Criteria(options.alpha, options.equivalence_percent)
+    compared = unit.read("comparisons")
     files = [
         write_bytes(folder(unit.out) / f"{table.name}.{ending}", render(table).encode())
         for table in build_tables(compared, criteria, facts["fitted_on"], facts["missing"])

@@ -32,9 +32,11 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
         markers, times, person.markers, unit.read("marker-events", trial)
     )
     scene = motion_and_wrench_of(unit, person, phi, trial)
+    plates = plates_of(unit.read("plates", trial), unit.read("wrench", trial))
+    zeros = unit.facts("wrench", trial).get("zeros", {})
     return replace(
         scene,
-        plates=_seen_plates(unit, trial),
+        plates=tuple(replace(plate, zeroed=plate.name in zeros) for plate in plates),
         robust_limit_m=unit.config.ik.robust_limit_m,
         residual_m=marker_residuals(person, scene.q, markers),
     )
@@ -80,12 +82,6 @@ def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:
     """(4, 3) corners of a plate in a ``plates`` table, if it has any."""
     rows = corners[corners["plate"].astype(str) == name].sort_values("corner")
     return rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
-
-
-def _seen_plates(unit: Unit, trial: Trial | None) -> tuple[Plate, ...]:
-    zeros = unit.facts("wrench", trial).get("zeros", {})
-    found = plates_of(unit.read("plates", trial), unit.read("wrench", trial))
-    return tuple(replace(plate, zeroed=plate.name in zeros) for plate in found)
 
 
 def plates_of(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
@@ -13,8 +12,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bsip_cli.statistics import samples
 from bsip_cli.statistics.hypothesis_tests import (
-    PostHoc,
     cohens_d_pooled,
     d_of_differences,
     described_pair,
@@ -28,21 +27,12 @@ from bsip_cli.statistics.hypothesis_tests import (
     williams_t,
 )
 from bsip_cli.statistics.methods import ALTERNATIVES, MEASURED, OM, RM
-from bsip_cli.statistics.samples import (
-    TestResult,
-    adjusted_p_values,
-    finite_pairs,
-    finite_values,
-    lilliefors_test,
-    mean_of,
-    standard_deviation,
-)
 
 # --- one line of the cohort's results: a test, or a description, with all its numbers -------------
 
 
 @dataclass(frozen=True)
-class Comparison(TestResult):
+class Comparison(samples.TestResult):
     """A test of method_a against method_b.
 
     `p_holm` corrects for all rows of the same test with the same method_b in the same table.
@@ -85,7 +75,9 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
             families[row.topic.table, row.test, row.method_b].append(place)
     corrected = list(comparisons)
     for places in families.values():
-        adjusted = adjusted_p_values([comparisons[place].p_value for place in places], "holm")
+        adjusted = samples.adjusted_p_values(
+            [comparisons[place].p_value for place in places], "holm"
+        )
         for place, p in zip(places, adjusted, strict=True):
             corrected[place] = replace(comparisons[place], p_holm=p)
     return tuple(corrected)
@@ -94,9 +86,7 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
 # --- values, and those that belong to one line of a table -----------------------------------------
 
 
-DIFFERENCE = f"|{OM}-{RM}|"
-"""The method of a value that is how far both are apart."""
-
+DIFFERENCE = f"|{OM}-{RM}|"  # the method of a value that is how far both are apart
 OVER_TASKS = ("table2", "table3", "table6")
 """Tables of the identification sequence, under whatever task names it was recorded."""
 
@@ -166,12 +156,10 @@ def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[
 
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
+_MEANS = ("n", "mean_a", "sd_a", "mean_b", "sd_b")
 
-DATA_SHARE = "_data_share"
-"""Ending of the variable that says how far the data decided a mass."""
-
-PAIR = f"{OM}-{RM}"
-"""In the column of methods: of the difference between the two."""
+DATA_SHARE = "_data_share"  # ending of the variable that says how far the data decided a mass
+PAIR = f"{OM}-{RM}"  # in the column of methods: of the difference between the two
 
 
 @dataclass(frozen=True)
@@ -198,7 +186,7 @@ class Pair:
     y: Sample
     origin: Origin
 
-    def row(self, test: str, origin: Origin, result: TestResult, **more: Any) -> Comparison:
+    def row(self, test: str, origin: Origin, result: samples.TestResult, **more: Any) -> Comparison:
         return Comparison(self.topic, test, origin, OM, self.other, **(vars(result) | more))
 
 
@@ -213,15 +201,15 @@ def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[
 
 def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
     """Mean and SD of one method, without a test."""
-    x = finite_values(per_participant(values, (method,))[:, 0])
-    found = {"n": len(x), "mean_a": mean_of(x), "sd_a": standard_deviation(x)}
+    x = samples.finite_values(per_participant(values, (method,))[:, 0])
+    found = {"n": len(x), "mean_a": samples.mean_of(x), "sd_a": samples.standard_deviation(x)}
     return Comparison(topic, "description", "published", method, **found)  # type: ignore[arg-type]
 
 
 def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
-    normality = lilliefors_test(np.subtract(*finite_pairs(pair.x, pair.y)))
+    normality = samples.lilliefors_test(np.subtract(*samples.finite_pairs(pair.x, pair.y)))
     by_t = pair.row(
         "paired_t",
         pair.origin,
@@ -231,7 +219,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
-    d_z = TestResult(n=test.n, difference=test.difference, reason=test.reason)
+    d_z = samples.TestResult(n=test.n, difference=test.difference, reason=test.reason)
     d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
     ranks = wilcoxon(pair.x, pair.y)
     by_rank = pair.row("wilcoxon", "added", ranks, effect_size_name="rank-biserial")
@@ -240,7 +228,7 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
 
 def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
     """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    other = mean_of(finite_pairs(pair.x, pair.y)[1])
+    other = samples.mean_of(samples.finite_pairs(pair.x, pair.y)[1])
     bound = abs(other) * criteria.equivalence_percent / 100.0
     return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
 
@@ -265,9 +253,11 @@ def methods_compared(
     table : shape (participants, methods), in the topic's unit.
     """
     table = table[np.isfinite(table).all(axis=1)]
-    of_each = [lilliefors_test(column) for column in table.T]
+    of_each = [samples.lilliefors_test(column) for column in table.T]
     pairs = combinations(range(len(methods)), 2)
-    differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
+    differences = {
+        (i, j): samples.lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs
+    }
     why = all_reasons(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
     between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
@@ -284,20 +274,13 @@ def methods_compared(
         }
         yield Comparison(topic, name, origin, " / ".join(methods), **numbers)
         for (i, j), p in differences.items():
-            numbers = _pair_numbers(table[:, i], table[:, j], post_hoc, (i, j), test.reason)
+            means = described_pair(table[:, i], table[:, j])  # also where no test was possible
+            numbers = vars(post_hoc.get((i, j), means.with_(reason=test.reason)))
+            numbers = (
+                numbers | {name: getattr(means, name) for name in _MEANS} | {"lilliefors_p": p}
+            )
             pair = methods[i], methods[j]
-            numbers["lilliefors_p"] = p
             yield Comparison(topic, f"bonferroni_{after}", origin, *pair, **numbers)
-
-
-def _pair_numbers(
-    x: Sample, y: Sample, post_hoc: PostHoc, place: tuple[int, int], reason: str
-) -> dict[str, Any]:
-    """Of a post hoc test; means also where it was not possible."""
-    means = described_pair(x, y)
-    found = post_hoc.get(place, means.with_(reason=reason))
-    kept = ("n", "mean_a", "sd_a", "mean_b", "sd_b")
-    return vars(found) | {name: getattr(means, name) for name in kept}
 
 
 # --- which test belongs to which table ------------------------------------------------------------
@@ -328,7 +311,7 @@ def _tests_of_topic(
         yield from methods_compared(topic, columns, methods, alpha)
     for pair in pairs_of(topic, values, "published" if is_published else "added"):
         if only_described:  # means and SDs
-            means = described_pair(*finite_pairs(pair.x, pair.y))
+            means = described_pair(*samples.finite_pairs(pair.x, pair.y))
             yield pair.row("description", pair.origin, means)
         elif table != "table3" or pair.other != RM:
             yield from t_and_rank_tests(pair, alpha)
@@ -362,8 +345,8 @@ class PersonTest:
 
     participant: str
     topic: Topic
-    williams: TestResult
-    fisher: TestResult
+    williams: samples.TestResult
+    fisher: samples.TestResult
 
     def values(self) -> tuple[Value, ...]:
         one, other = self.williams, self.fisher
@@ -402,9 +385,9 @@ class PersonTestCounts:
     """What the participants' tests come to; keeps numbers of them, not the tests."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[Topic, str, Origin], array[float]] = defaultdict(
-            lambda: array("d")  # statistic and p, one participant after the other
-        )
+        # statistic and p of each participant
+        self._numbers: dict[tuple[Topic, str, Origin], list[tuple[float, float]]]
+        self._numbers = defaultdict(list)
         self._reasons: dict[tuple[Topic, str, Origin], set[str]] = defaultdict(set)
 
     def add(self, tests: Iterable[PersonTest]) -> None:
@@ -414,7 +397,7 @@ class PersonTestCounts:
                 ("fisher_z", "published", test.fisher),
             ):
                 key: Any = (test.topic, name, origin)
-                self._numbers[key].extend((found.statistic, found.p_value))
+                self._numbers[key].append((found.statistic, found.p_value))
                 self._reasons[key] |= {found.reason} if found.reason else set()
 
     def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
@@ -422,7 +405,7 @@ class PersonTestCounts:
         return tuple(Comparison(*key, OM, RM, **self._of(key, alpha)) for key in self._numbers)
 
     def _of(self, key: tuple[Topic, str, Origin], alpha: float) -> dict[str, Any]:
-        numbers, reasons = np.reshape(self._numbers[key], (-1, 2)), self._reasons[key]
+        numbers, reasons = np.array(self._numbers[key]), self._reasons[key]
         total = len(numbers)
         t, p = numbers[~np.isnan(numbers[:, 1])].T
         better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))

@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from bsip_cli.statistics.samples import (
-    Intervals,
-    concatenated,
-    effective_samples_of_pair,
-    finite_intervals,
-    is_constant,
-)
+from bsip_cli.statistics import samples
 
 ELLIPSE_SHARE = 0.95
 MM_PER_M = 1e3
@@ -44,7 +38,7 @@ class FitMeasures:
 def fit_measures(
     measured: ArrayLike,
     computed: ArrayLike,
-    intervals: Intervals | None = None,
+    intervals: samples.Intervals | None = None,
     body_weight_N: float | None = None,
 ) -> FitMeasures:
     """RMSE, Pearson's r and the Sprague-Geers metric of two signals over the given intervals.
@@ -61,27 +55,27 @@ def fit_measures(
     ValueError: if the shapes differ or the intervals do not fit them.
     """
     measured, computed = np.asarray(measured, dtype=float), np.asarray(computed, dtype=float)
-    parts = finite_intervals(intervals, measured, computed)
-    m, c = concatenated(measured, parts), concatenated(computed, parts)
+    parts = samples.finite_intervals(intervals, measured, computed)
+    m, c = samples.concatenated(measured, parts), samples.concatenated(computed, parts)
     if len(m) == 0:
         return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
     magnitude, phase = _magnitude_and_phase(m, c)
     schwer = magnitude, phase, hypot(magnitude, phase)
-    n_effective = effective_samples_of_pair(measured, computed, parts)
+    n_effective = samples.effective_samples_of_pair(measured, computed, parts)
     return FitMeasures(rmse, percent, _pearson(m, c), *schwer, len(m), n_effective)
 
 
-def correlation(x: ArrayLike, y: ArrayLike, intervals: Intervals | None = None) -> float:
+def correlation(x: ArrayLike, y: ArrayLike, intervals: samples.Intervals | None = None) -> float:
     """Pearson's r of two signals, as in `fit_measures`."""
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    parts = finite_intervals(intervals, first, second)
-    return _pearson(concatenated(first, parts), concatenated(second, parts))
+    parts = samples.finite_intervals(intervals, first, second)
+    return _pearson(samples.concatenated(first, parts), samples.concatenated(second, parts))
 
 
 def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
-    if len(m) < 2 or is_constant(m) or is_constant(c):
+    if len(m) < 2 or samples.is_constant(m) or samples.is_constant(c):
         return nan
     return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0))
 
@@ -122,7 +116,10 @@ class Posturography:
 
 
 def posturography(
-    cop_ap_m: ArrayLike, cop_ml_m: ArrayLike, rate_hz: float, intervals: Intervals | None = None
+    cop_ap_m: ArrayLike,
+    cop_ml_m: ArrayLike,
+    rate_hz: float,
+    intervals: samples.Intervals | None = None,
 ) -> Posturography:
     """RMS, mean velocity, path length and 95 % ellipse area of a centre of pressure.
 
@@ -141,8 +138,8 @@ def posturography(
     if not rate_hz > 0.0:
         raise ValueError(f"rate_hz must be positive, not {rate_hz}")
     ap, ml = np.asarray(cop_ap_m, dtype=float), np.asarray(cop_ml_m, dtype=float)
-    parts = finite_intervals(intervals, ap, ml)
-    path = np.stack([concatenated(ap, parts), concatenated(ml, parts)])
+    parts = samples.finite_intervals(intervals, ap, ml)
+    path = np.stack([samples.concatenated(ap, parts), samples.concatenated(ml, parts)])
     n = path.shape[1]
     if n == 0:
         return Posturography()

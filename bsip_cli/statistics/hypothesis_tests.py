@@ -28,9 +28,7 @@ from bsip_cli.statistics.samples import (
     standard_deviation,
 )
 
-MINIMUM_PAIRS = 3
-"""Fewer pairs give a t test whose interval says nothing."""
-
+MINIMUM_PAIRS = 3  # fewer pairs give a t test whose interval says nothing
 MINIMUM_FOR_WILCOXON = 6
 """Of five pairs or fewer even the most extreme ranks have p = 2 / 2^5 > 0.05."""
 
@@ -40,9 +38,7 @@ the normal approximation."""
 
 EXACT_WITH_TIES_UP_TO = 16
 
-MINIMUM_SAMPLES = 4.0
-"""Both tests of correlations divide by n - 3."""
-
+MINIMUM_SAMPLES = 4.0  # both tests of correlations divide by n - 3
 SMALLEST_DETERMINANT = 1e-12
 
 PostHoc = dict[tuple[int, int], TestResult]

@@ -96,8 +96,7 @@ def p_of_one_size(estimates: np.ndarray, widths: np.ndarray) -> float:
 # --- is a sample normal enough for a t test? ------------------------------------------------------
 
 
-MINIMUM_FOR_LILLIEFORS = 4
-"""The simulated table of critical values starts here."""
+MINIMUM_FOR_LILLIEFORS = 4  # the simulated table of critical values starts here
 
 
 def lilliefors_test(x: ArrayLike) -> TestResult:
@@ -123,8 +122,7 @@ def lilliefors_test(x: ArrayLike) -> TestResult:
     return TestResult(n=n, statistic=float(statistic), p_value=float(p_value))
 
 
-ROUNDING = 1e-12
-"""Differences below this part of the largest value are rounding, not variation."""
+ROUNDING = 1e-12  # differences below this part of the largest value are rounding, not variation
 
 
 def finite_values(x: ArrayLike) -> NDArray[np.float64]:
@@ -223,11 +221,8 @@ def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[n
 # --- how many independent samples an autocorrelated series is worth -------------------------------
 
 
-MINIMUM_SAMPLES = 4
-"""Below this no autocorrelation can be estimated and the answer is nan."""
-
-WINDOW_PER_TIME = 5.0
-"""Lags summed, in integrated correlation times (Sokal 1997, section 3)."""
+MINIMUM_SAMPLES = 4  # below this no autocorrelation can be estimated and the answer is nan
+WINDOW_PER_TIME = 5.0  # lags summed, in integrated correlation times (Sokal 1997, section 3)
 
 
 def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float:

@@ -20,7 +20,7 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
-from bsip_cli.commands.export_recording import _why_left, causes_here
+from bsip_cli.commands.named_causes import causes_here, why_left
 from bsip_cli.diagnosis.findings import Number
 from bsip_cli.instruments.c3d_file import wired_plates
 from bsip_cli.recordings.model import Recording
@@ -523,8 +523,8 @@ def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size(hide, capsys
     study.diagnosed_as(alike=[("marker_shift", "T10")])
     study.exported()
     assert "marker_shift T10: one of several causes" in capsys.readouterr().err
-    assert _why_left("marker_shift", "unknown").startswith("no fault of the plates")
-    assert _why_left("marker_swap", "unknown") == _why_left("plate_gain", "unknown") == "unknown"
+    assert why_left("marker_shift", "unknown").startswith("no fault of the plates")
+    assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

@@ -11,6 +11,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.report.blocks import Document, Picture
 from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
 from bsip_cli.stages.joints import peaks_of
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
@@ -507,3 +508,8 @@ def svgs(html: str) -> list[bytes]:
     """The figures of a page."""
     found = re.findall(r'src="data:image/svg\+xml;base64,([^"]+)"', html)
     return [base64.b64decode(code) for code in found]
+
+
+def pictures_of(document: Document) -> list[Picture]:
+    """All of a report."""
+    return [block for block in document.blocks() if isinstance(block, Picture)]

@@ -16,8 +16,9 @@ from bsip_cli.report.effect_words import (
     size_words,
 )
 from bsip_cli.report.errors import budget_sentences, found_share, overall_pieces, pieces
-from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
+from bsip_cli.report.participant.document import limit_blocks, nearest
 from bsip_cli.report.verdict import (
+    Verdict,
     cause_line,
     cause_text,
     change_sentence,
@@ -40,8 +41,14 @@ def test_every_effect_has_words():
     assert set(EFFECT_WORDS) == {*EFFECTS, UNNAMED, SOFT_TISSUE}
 
 
+def paragraphs(said: Verdict) -> tuple[str, ...]:
+    """Everything, in order."""
+    limits = (said.limits,) if said.limits else ()
+    return (said.headline, *said.causes, *said.results, *said.advice, *limits)
+
+
 def text_of(*tables) -> str:
-    return " ".join(verdict_of(*tables).paragraphs())
+    return " ".join(paragraphs(verdict_of(*tables)))
 
 
 def test_the_verdict_says_what_how_large_how_sure_and_where(found):
@@ -172,8 +179,8 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
     assert said.headline.startswith("No fault found. None of the")
-    assert said.paragraphs()[1] == "Recordings analysed: basketball (run 1) and sequence (run 1)."
-    assert said.paragraphs()[2].endswith("might have gone unseen.")
+    assert paragraphs(said)[1] == "Recordings analysed: basketball (run 1) and sequence (run 1)."
+    assert paragraphs(said)[2].endswith("might have gone unseen.")
 
 
 def test_a_large_error_is_one_plain_line_and_hides_faults(found):

@@ -20,7 +20,7 @@ from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
 from bsip_cli.running.freshness import why_stale
 from bsip_cli.stages.report import record_of
-from tests.report.fake_study import EVIL, Artifacts, empty, gains
+from tests.report.fake_study import EVIL, Artifacts, empty, gains, pictures_of
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_no_trial_served(record):
     assert "No recording has forces that could be compared." in text
     assert "No marker residuals are known." in text
     assert "bsip joints" in text
-    assert [p.name for p in document.pictures()] == ["error_budget", "masses"]
+    assert [p.name for p in pictures_of(document)] == ["error_budget", "masses"]
 
 
 def test_nothing_on_the_plates(record):
@@ -102,7 +102,7 @@ def test_nothing_on_the_plates(record):
         trials.append(replace(trial, reconstruction=frame, fit=fit))
     document = participant_document(replace(record, trials=tuple(trials)))
     assert "No recording has forces that could be compared." in words_of(document)
-    assert "forces" not in [p.name for p in document.pictures()]
+    assert "forces" not in [p.name for p in pictures_of(document)]
     (scales,) = (block.scales for block in document.front if isinstance(block, Scales))
     assert [scale.words for scale in scales[:2]] == ["not known", "not known"]
 
@@ -147,7 +147,7 @@ def test_frames_without_a_pose(record):
         for t in record.trials
     )
     document = participant_document(replace(record, trials=trials))
-    assert "person" not in [p.name for p in document.pictures()]
+    assert "person" not in [p.name for p in pictures_of(document)]
 
 
 def test_unknown_shares_spreads_and_masses(record):
@@ -159,7 +159,7 @@ def test_unknown_shares_spreads_and_masses(record):
     document = participant_document(replace(record, bsip=bsip, facts=facts))
     text = words_of(document)
     assert "plates say" not in text
-    assert all(picture.svg for picture in document.pictures() if picture.name == "masses")
+    assert all(picture.svg for picture in pictures_of(document) if picture.name == "masses")
 
 
 def test_refusals_lead_the_warnings(record):

@@ -19,7 +19,7 @@ from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
 from bsip_cli.report.words import number, with_spread
 from bsip_cli.stages.report import record_of
-from tests.report.fake_study import EVIL, MASS_KG, svgs
+from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs
 
 TITLES = (
     "Is anything wrong, and how sure is that?",
@@ -89,7 +89,7 @@ def test_all_sections_are_there_in_order_and_folded(page):
 
 def test_figures_are_whole_pictures_with_words_and_numbers(reports, record, page):
     figures = svgs(page)
-    pictures = list(participant_document(record).pictures())
+    pictures = pictures_of(participant_document(record))
     assert len(figures) == len(pictures) == 6
     for figure in figures:
         assert ElementTree.fromstring(figure).tag.endswith("svg")

@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import errors
 from bsip_cli.report.blocks import (
     WORDS,
     Block,
@@ -19,10 +20,10 @@ from bsip_cli.report.blocks import (
     Light,
     Links,
     Paragraph,
-    Picture,
     Section,
     State,
     Terms,
+    picture,
 )
 from bsip_cli.report.cohort import laboratory
 from bsip_cli.report.cohort.record import (
@@ -35,14 +36,6 @@ from bsip_cli.report.cohort.record import (
     named_people,
     shared_causes,
 )
-from bsip_cli.report.errors import (
-    COP_LIMIT_M,
-    ENDS_AT,
-    FORCE_LIMIT_PERCENT,
-    Yardstick,
-    one_number_alone,
-    yardsticks,
-)
 from bsip_cli.report.figures.charts import Strip, gain_dots, strips
 from bsip_cli.report.records import how_made
 from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
@@ -50,6 +43,7 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import (
     MISSING,
+    TEXTS,
     abbreviations,
     capital,
     component_label,
@@ -129,13 +123,13 @@ def _front(record: CohortRecord) -> Iterator[Block]:
         yield Paragraph("Nobody is missing.")
 
 
-def _yardsticks(record: CohortRecord) -> tuple[Yardstick, ...]:
+def _yardsticks(record: CohortRecord) -> tuple[errors.Yardstick, ...]:
     diagnosis = record.defaults["diagnosis"]
     limits = (
         record.made.number(f"diagnosis.{name}", float(diagnosis[name]))
-        for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT)
+        for name in (errors.COP_LIMIT_M, errors.FORCE_LIMIT_PERCENT)
     )
-    return yardsticks(*limits)
+    return errors.yardsticks(*limits)
 
 
 def _strips(record: CohortRecord) -> Iterator[Block]:
@@ -147,7 +141,9 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(Strip(title, values, names, far, one.good, one.limit, ENDS_AT * one.limit))
+        drawn.append(
+            Strip(title, values, names, far, one.good, one.limit, errors.ENDS_AT * one.limit)
+        )
         rows[one.name] = list(values)
         far_out += [
             (
@@ -160,17 +156,7 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
     if not any(np.isfinite(strip.values).any() for strip in drawn):
         yield Paragraph("No errors are known.", "warning")
         return
-    yield Picture(
-        strips(drawn),
-        "yardsticks",
-        "A dot per person, with the parameters to use; the line is the median. COP: centre of "
-        "pressure. Blue: as good as published (Hansen 2017, table 4; markers: quiet stance). Red: "
-        "large (Hicks 2015; OpenSim's checklist). Triangles: beyond the axis, with the number.",
-        "Strips of dots: errors per person.",
-        "low and close together is good. All high: the laboratory. One high: that person.",
-        "read the laboratory's part below, or the report of who lies far out.",
-        pd.DataFrame(rows),
-    )
+    yield picture("yardsticks", strips(drawn), pd.DataFrame(rows))
     linked = tuple((words, member.link()) for words, member in far_out if member.link())
     if linked:
         yield Links("Far from the others, or large:", linked[: 2 * _MOST])
@@ -304,11 +290,7 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         yield Paragraph("No trial could be compared with both methods.", "warning")
         return
     if not ratios.held_out:
-        yield Paragraph(
-            "Nobody has held-out data: these numbers are from the data that identified the "
-            "parameters, and favour OM.",
-            "warning",
-        )
+        yield Paragraph(TEXTS["nobody_held_out"], "warning")
     worse = []
     for name in names:
         over = ratios.over_best_other(name)
@@ -325,17 +307,8 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
     of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
     where = "held-out data" if ratios.held_out else "the data that identified the parameters"
     data = pd.concat(table.assign(component=name) for name, table in ratios.of_component.items())
-    yield Picture(
-        gain_dots([component_label(name) for name in names], of_method),
-        "gain",
-        f"Error of RM+mass and of OM over error of RM, on {where}; a dot per participant, the bar "
-        "their geometric mean.",
-        "Dots: error ratios per component.",
-        "left of 1 follows better. What RM+mass gains is one number's doing, no gain of "
-        "identification.",
-        "use OM only where its dots lie left of those of RM+mass.",
-        data.reset_index(),
-    )
+    figure = gain_dots([component_label(name) for name in names], of_method)
+    yield picture("gain", figure, data.reset_index(), where=where)
     yield Grid(
         ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
         tuple(_row(name, ratios) for name in names),
@@ -351,7 +324,7 @@ def _one_number(ratios: Ratios) -> Iterator[Block]:
         rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
         if np.isfinite(rm_mass):
             over = (1 + om) / (1 + rm_mass) - 1
-            yield Paragraph(one_number_alone(component_label(name), rm_mass, om, over))
+            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om, over))
 
 
 def _typical(ratios: np.ndarray) -> float:
@@ -383,16 +356,7 @@ def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
-_STATES: dict[State, str] = {  # the worst first
-    "large": "with a large error",
-    "cause": "with something found but no large error",
-    "inconclusive": "inconclusive",
-    "fine": "fine",
-}
-_SOME_ARE_WRONG = (
-    "The probabilities hold as far as the model of ordinary errors does. Of findings with 95 %, one "
-    "in twenty is expected not to be there: among many people some are not."
-)
+_STATES: dict[State, str] = TEXTS["states"]
 
 
 def light_of_all(record: CohortRecord) -> Light:
@@ -434,7 +398,7 @@ def diagnoses_section(record: CohortRecord) -> Section:
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
     if rows:
-        blocks.append(Paragraph(_SOME_ARE_WRONG, "note"))
+        blocks.append(Paragraph(TEXTS["some_are_wrong"], "note"))
     return Section("diagnoses", "What is wrong in the recordings", tuple(blocks))
 
 

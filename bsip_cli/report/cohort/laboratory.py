@@ -13,45 +13,36 @@ from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Sectio
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.effect_words import effect_title, parameter_label, place_label, size_words
 from bsip_cli.report.verdict import probability_words
-from bsip_cli.report.words import MISSING, capital, listing, true_minus
+from bsip_cli.report.words import MISSING, TEXTS, capital, listing, true_minus
 
 SAID = ("named", "ambiguous")
-_NOT_RUN = "The faults of the laboratory were not looked for: run `bsip laboratory`."
+_TEXTS = TEXTS["laboratory"]
 _HEAD = ("fault", "where", "number", "estimate (95 % interval)", "seen from", "probability")
-_CAPTION = (
-    "What was found, and of each other fault the likeliest place. Estimate: if the fault is there. "
-    "Seen from: this size would be named in 95 of 100 laboratories with these recordings"
-)
-_ALONE = "With one person, faults of the laboratory are in the person's report."
-_WHAT_TO_DO = (
-    "Check each fault in the laboratory, as its sentence says, before correcting anything. An error "
-    "of the model that all persons share can look like a fault of a plate."
-)
 
 
 def first(record: CohortRecord) -> Iterator[Block]:
     """For the first page: what is wrong with it, or what would have been named."""
     if record.laboratory is None:
-        yield Paragraph(_NOT_RUN, "note")
+        yield Paragraph(_TEXTS["not_run"], "note")
         return
     said = tuple(named_sentences(record.laboratory))
     unnamed = tuple(unnamed_sentences(record.laboratory))
     if said:
         yield Bullets(said, "warning")
-        yield Paragraph(_WHAT_TO_DO, "note")
+        yield Paragraph(_TEXTS["what_to_do"], "note")
     yield from (Paragraph(text, "good") for text in unnamed)
     if not said and not unnamed:
-        yield Paragraph(_ALONE, "note")
+        yield Paragraph(_TEXTS["alone"], "note")
 
 
 def section(record: CohortRecord) -> Section:
     table = record.laboratory
-    blocks: list[Block] = [Paragraph(_NOT_RUN, "note")] if table is None else []
+    blocks: list[Block] = [Paragraph(_TEXTS["not_run"], "note")] if table is None else []
     if table is not None:
         for number, rows in _of_several(table).groupby("laboratory"):
             name = f"laboratory_{number}"
             cells = tuple(map(_row, _listed(rows)))
-            caption = f"Laboratory {number}. {_CAPTION}"
+            caption = f"Laboratory {number}. {_TEXTS['caption']}"
             blocks.append(Grid(_HEAD, cells, caption, words=3, name=name, data=rows))
     return Section("laboratory", "The laboratory", tuple(blocks))
 

@@ -15,14 +15,13 @@ from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table
-from bsip_cli.report.words import COMPONENTS, capital, listing, number, task_of
+from bsip_cli.report.words import COMPONENTS, TEXTS, capital, listing, number, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
 
-ReadValues = Callable[[str, str], pd.DataFrame]
-"""Table and variable to their rows of ``values``."""
+ReadValues = Callable[[str, str], pd.DataFrame]  # table and variable to their rows of ``values``
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,16 +127,12 @@ class CohortRecord:
 # --- causes that several people's recordings share ------------------------------------------------
 
 
-SHARED = (
-    "Shared causes may point to the laboratory, the task or the model rather than to a person "
-    "(a few of very many may be coincidence):"
-)
+SHARED = TEXTS["shared_causes"]
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
-Cause = tuple[Candidate, ...]
-"""A single candidate, or all of a group of which one is there."""
+Cause = tuple[Candidate, ...]  # a single candidate, or all of a group of which one is there
 
 
 @dataclass(frozen=True)

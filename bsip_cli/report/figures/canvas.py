@@ -17,6 +17,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from bsip_cli.errors import printable
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
+from bsip_cli.statistics.samples import intervals_of
 
 WIDTH_MM = 170.0  # the text width of a page
 INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
@@ -105,12 +106,8 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
 
 def plain(text: str, longest: int = LONGEST_LABEL) -> str:
     """A foreign label as it is: no mathematics, nothing unprintable, cut where it is too long."""
-    return literal(text if len(text) <= longest else f"{text[: longest - 1]}…")
-
-
-def literal(text: str) -> str:
-    """A foreign text as it is: no mathematics, nothing unprintable."""
-    return printable(text).replace("$", r"\$")
+    shown = text if len(text) <= longest else f"{text[: longest - 1]}…"
+    return printable(shown).replace("$", r"\$")
 
 
 def thinned(length: int, most: int = MOST_POINTS) -> slice:
@@ -118,15 +115,9 @@ def thinned(length: int, most: int = MOST_POINTS) -> slice:
     return slice(None, None, max(1, -(-length // most)))
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Half-open index pairs of the intervals where ``flags`` holds."""
-    steps = np.diff(np.concatenate([[0], np.asarray(flags, dtype=int), [0]]))
-    return list(zip(*(np.flatnonzero(steps == s).tolist() for s in (1, -1)), strict=True))
-
-
 def middle_of_longest(time_s: np.ndarray, flags: np.ndarray, seconds: float) -> slice:
     """Up to ``seconds`` from the middle of the longest interval where ``flags`` holds."""
-    intervals = runs(flags)
+    intervals = intervals_of(flags)
     if not intervals:
         return slice(0, 0)
     first, end = max(intervals, key=lambda pair: pair[1] - pair[0])

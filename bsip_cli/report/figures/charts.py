@@ -15,21 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills, ordered
-from bsip_cli.report.figures.canvas import (
-    BLUE,
-    FAINT,
-    INK,
-    MANY_PEOPLE,
-    ORANGE,
-    SOFT,
-    house_style,
-    legend_above,
-    line_of,
-    new_figure,
-    plain,
-    thinned,
-    tidy,
-)
+from bsip_cli.report.figures import canvas
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.samples import Z95
 
@@ -47,12 +33,12 @@ class Whole:
     pieces: tuple[Piece, ...]
 
 
-@house_style()
+@canvas.house_style()
 def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
     """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
     pieces whose order, and hatching of faults, are those of the first page's bar."""
     shown = {piece.label for bar in bars for piece in bar.pieces}
-    figure = new_figure(max(24.0, 14.0 + 2.2 * len(shown)) + 6.0 * len(bars))
+    figure = canvas.new_figure(max(24.0, 14.0 + 2.2 * len(shown)) + 6.0 * len(bars))
     axes = figure.add_subplot()
     fill = fills([*first, *(piece for bar in bars for piece in bar.pieces)])
     ends = np.zeros((len(bars), 2))  # left of zero, right of it
@@ -60,11 +46,11 @@ def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
     for label in (one for one in ordered(fill, (NOISE, UNKNOWN)) if one in shown):
         shares = [sum(p.share for p in bar.pieces if p.label == label) for bar in bars]
         handles[label] = _draw_shares(axes, np.array(shares), ends, fill[label])
-    axes.axvline(0.0, color=INK, lw=0.9)
+    axes.axvline(0.0, color=canvas.INK, lw=0.9)
     axes.set_yticks(range(len(bars)), [bar.label for bar in bars])
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
-    tidy(axes, grid="x")
+    canvas.tidy(axes, grid="x")
     figure.legend(
         list(handles.values()),
         list(handles),
@@ -86,7 +72,7 @@ def _draw_shares(axes: Axes, shares: np.ndarray, ends: np.ndarray, fill: Fill) -
     height = _HEIGHT / len(fill.colours)
     patches = []
     for k, colour in enumerate(fill.colours):
-        style: dict[str, Any] = {"facecolor": colour, "hatch": fill.hatch, "edgecolor": INK}
+        style: dict[str, Any] = {"facecolor": colour, "hatch": fill.hatch, "edgecolor": canvas.INK}
         at = rows - _HEIGHT / 2 + (k + 0.5) * height
         axes.barh(at, shares, left=start, height=height, lw=0.5, **style)
         patches.append(Patch(lw=0.5, **style))
@@ -94,17 +80,19 @@ def _draw_shares(axes: Axes, shares: np.ndarray, ends: np.ndarray, fill: Fill) -
     return tuple(patches)
 
 
-@house_style()
+@canvas.house_style()
 def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> Figure:
     """A bar per marker; the line is the limit."""
-    figure = new_figure(52)
+    figure = canvas.new_figure(52)
     axes = figure.add_subplot()
-    axes.bar(range(len(markers)), rms_mm, color=np.where(rms_mm > limit_mm, ORANGE, BLUE))
-    axes.axhline(limit_mm, color=INK, lw=0.9, ls="--")
-    axes.set_xticks(range(len(markers)), [plain(name) for name in markers], rotation=90)
+    axes.bar(
+        range(len(markers)), rms_mm, color=np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
+    )
+    axes.axhline(limit_mm, color=canvas.INK, lw=0.9, ls="--")
+    axes.set_xticks(range(len(markers)), [canvas.plain(name) for name in markers], rotation=90)
     axes.set_xlim(-0.6, len(markers) - 0.4)
     axes.set_ylabel("distance [mm]")
-    tidy(axes)
+    canvas.tidy(axes)
     axes.tick_params(axis="x", labelsize=6.5)
     return figure
 
@@ -118,42 +106,42 @@ def _ticks(axes: Axes, low: float, high: float) -> None:
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
 
 
-@house_style()
+@canvas.house_style()
 def segment_masses(data: pd.DataFrame) -> Figure:
     """Three panels over the segments (the index): masses ``rm_kg, rm_mass_kg, om_kg``, OM - RM with
     95 % intervals (``om_sd_kg``), and in 0..1 how much the data decide (``data_share``)."""
     rows = np.arange(len(data))
-    figure = new_figure(22.0 + 4.8 * len(rows))
+    figure = canvas.new_figure(22.0 + 4.8 * len(rows))
     masses, differences, shares = figure.subplots(1, 3, sharey=True, width_ratios=(3, 3, 1.5))
     positive = data["om_kg"].where(data["om_kg"] > 0.0)
     own = ((RM, data["rm_kg"], 24), (RM_MASS, data["rm_mass_kg"], 9), (OM, positive, 16))
     for method, kg, size in own:
-        line = line_of(method)
+        line = canvas.line_of(method)
         style = {"facecolor": "white" if method == RM else line.colour, "edgecolor": line.colour}
         masses.scatter(kg, rows, marker=line.marker, s=size, label=method, **style)
     masses.set_xscale("log")
     both = np.concatenate([data["rm_kg"], positive])
     _ticks(masses, np.nanmin(both) / 1.35, np.nanmax(both) * 1.35)
     masses.set_xlabel("mass [kg] (log scale)")
-    legend_above(masses)
-    differences.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
+    canvas.legend_above(masses)
+    differences.axvline(0.0, color=canvas.ORANGE, lw=1.2, ls="--")
     spread = np.nan_to_num(Z95 * data["om_sd_kg"])
     dots: dict[str, Any] = {
         "fmt": "o",
         "ms": 4,
-        "color": BLUE,
-        "ecolor": SOFT,
+        "color": canvas.BLUE,
+        "ecolor": canvas.SOFT,
         "elinewidth": 1.1,
         "capsize": 2,
     }
     differences.errorbar(data["om_kg"] - data["rm_kg"], rows, xerr=spread, **dots)
     differences.set_xlabel("OM − RM [kg], 95 % interval")
-    shares.barh(rows, 100.0, height=0.55, color=FAINT)
-    shares.barh(rows, np.nan_to_num(100.0 * data["data_share"]), height=0.55, color=BLUE)
+    shares.barh(rows, 100.0, height=0.55, color=canvas.FAINT)
+    shares.barh(rows, np.nan_to_num(100.0 * data["data_share"]), height=0.55, color=canvas.BLUE)
     shares.set_xlim(0.0, 100.0)
     shares.set_xlabel("data decide [%]")
     for axes in (masses, differences, shares):
-        tidy(axes, grid="both")
+        canvas.tidy(axes, grid="both")
     masses.set_yticks(rows, data.index)
     masses.set_ylim(len(rows) - 0.4, -0.6)
     return figure
@@ -179,10 +167,10 @@ class Strip:
     end: float
 
 
-@house_style()
+@canvas.house_style()
 def strips(data: Sequence[Strip]) -> Figure:
     """Side by side; light blue is as good as published, above the red line is large."""
-    figure = new_figure(70.0)
+    figure = canvas.new_figure(70.0)
     panels = figure.subplots(1, len(data), squeeze=False)[0]
     for axes, strip in zip(panels, data, strict=True):
         _draw_strip(axes, strip)
@@ -194,8 +182,8 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
     offsets = np.linspace(-_SPREAD, _SPREAD, len(known)) if len(known) > 1 else np.zeros(len(known))
     axes.axhspan(0.0, strip.good, color="#cfe3f2", lw=0)
     axes.axhline(strip.limit, color="#b30000", lw=1.2)
-    colours = np.where(strip.far[known], ORANGE, BLUE)
-    many = len(known) > MANY_PEOPLE
+    colours = np.where(strip.far[known], canvas.ORANGE, canvas.BLUE)
+    many = len(known) > canvas.MANY_PEOPLE
     beyond = strip.values[known] > strip.end
     for marker, mine, most in (("o", ~beyond, strip.end), ("^", beyond, 0.98 * strip.end)):
         axes.scatter(
@@ -208,49 +196,49 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
         )
     for x, k in zip(offsets, known, strict=True):
         if strip.far[k]:
-            value, name = float(strip.values[k]), plain(strip.names[k])
+            value, name = float(strip.values[k]), canvas.plain(strip.names[k])
             name, lift = (f"{name}: {value:.3g}", -9) if value > strip.end else (name, 3)
             place = (x, min(value, strip.end))
             axes.annotate(name, place, (5, lift), textcoords="offset points", size=7)
     if len(known):
         middle = min(float(np.median(strip.values[known])), strip.end)
-        axes.hlines(middle, -0.42, 0.42, color=INK, lw=1.4)
+        axes.hlines(middle, -0.42, 0.42, color=canvas.INK, lw=1.4)
     axes.set_xlim(-0.6, 0.9)
     axes.set_ylim(0.0, strip.end)
     axes.set_xticks([])
     axes.set_title(strip.title, fontsize=8, loc="left")
-    tidy(axes)
+    canvas.tidy(axes)
 
 
-@house_style()
+@canvas.house_style()
 def gain_dots(components: Sequence[str], ratios: Mapping[str, np.ndarray]) -> Figure:
     """A row per component; of each method (c, p) its error over RM's, a dot per person, a line at
     the geometric mean."""
     rows = len(components)
-    figure = new_figure(24.0 + 8.0 * rows)
+    figure = canvas.new_figure(24.0 + 8.0 * rows)
     axes = figure.add_subplot()
     for method, table in ratios.items():
         for row, of_row in enumerate(table):
             _draw_gains(axes, method, row, of_row)
-    axes.axvline(1.0, color=SOFT, lw=1.0)
+    axes.axvline(1.0, color=canvas.SOFT, lw=1.0)
     everything = np.concatenate(list(ratios.values()))
     low = min(0.5, float(np.nanmin(everything))) / 1.15
     high = max(2.0, float(np.nanmax(everything))) * 1.15
     axes.set_xscale("log")
     _ticks(axes, low, high)
-    legend_above(axes)
+    canvas.legend_above(axes)
     axes.set_yticks(range(rows), components)
     axes.set_ylim(rows - 0.5, -0.5)
     axes.set_xlabel("error over that of RM (left of 1: follows better)")
-    tidy(axes, grid="x")
+    canvas.tidy(axes, grid="x")
     transform = axes.get_yaxis_transform()
-    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=transform, color=FAINT, lw=0.6)
+    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=transform, color=canvas.FAINT, lw=0.6)
     return figure
 
 
 def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
-    line, people = line_of(method), len(ratios)
-    many = people > MANY_PEOPLE
+    line, people = canvas.line_of(method), len(ratios)
+    many = people > canvas.MANY_PEOPLE
     offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
     axes.scatter(
         ratios,
@@ -276,8 +264,6 @@ def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
 class Panel:
     """Signals of one quantity.
 
-    Attributes
-    ----------
     title : what it is, with its unit.
     time_s : (n,).
     signals : label of the method -> (n,), NaN where there are none.
@@ -290,11 +276,11 @@ class Panel:
     spreads: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
-@house_style()
+@canvas.house_style()
 def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Figure:
     """Panels in rows of ``columns``, one legend above; bands are 95 % intervals."""
     rows = -(-len(panels) // columns)
-    figure = new_figure(12.0 + height_mm * rows)
+    figure = canvas.new_figure(12.0 + height_mm * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for axes, panel in zip(grid.flat, panels, strict=False):
         _draw(axes, panel)
@@ -308,18 +294,18 @@ def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Fi
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
-    keep = thinned(len(panel.time_s))
+    keep = canvas.thinned(len(panel.time_s))
     time = panel.time_s[keep]
     for method, values in panel.signals.items():
-        line = line_of(method)
+        line = canvas.line_of(method)
         axes.plot(time, values[keep], color=line.colour, ls=line.style, lw=line.width, label=method)
         if method in panel.spreads:
             half = Z95 * panel.spreads[method][keep]
             low, high = values[keep] - half, values[keep] + half
             axes.fill_between(time, low, high, color=line.colour, alpha=0.2, lw=0)
     if panel.spreads:
-        axes.axhline(0.0, color=SOFT, lw=0.5, zorder=0)
+        axes.axhline(0.0, color=canvas.SOFT, lw=0.5, zorder=0)
     axes.set_title(panel.title, fontsize=8, loc="left", pad=3)
     axes.set_xlim(panel.time_s[0], panel.time_s[-1])
-    tidy(axes)
+    canvas.tidy(axes)
     axes.tick_params(labelsize=7)

@@ -12,16 +12,7 @@ from matplotlib.patches import Circle
 
 from bsip_cli.body.person import Person
 from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.report.figures.canvas import (
-    BLUE,
-    FAINT,
-    GREEN,
-    INK,
-    SOFT,
-    house_style,
-    new_figure,
-    plain,
-)
+from bsip_cli.report.figures import canvas
 from bsip_cli.report.records import clock_of, flags_of, measured_of
 
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
@@ -29,29 +20,29 @@ _WIDE_MM, _HIGH_MM = 62.0, 92.0
 _MARGIN_M = 0.06
 _LONGEST = 30  # letters of a trial's label in a line under the figure
 _TILE_M = 0.5
-_LIMBS = {"l": ("#9a9a9a", 2.2), "r": (INK, 1.8), "": (INK, 1.8)}
+_LIMBS = {"l": ("#9a9a9a", 2.2), "r": (canvas.INK, 1.8), "": (canvas.INK, 1.8)}
 
 
-@house_style()
+@canvas.house_style()
 def stick_figure(pose: Pose, trial: str) -> Figure:
     """Left limbs grey, right ones black; the arrow of one body weight is half as long as the
     person is tall."""
-    figure = new_figure(_HIGH_MM, _WIDE_MM)
+    figure = canvas.new_figure(_HIGH_MM, _WIDE_MM)
     axes = figure.subplots()
     centre = pose.bones_m[0, 0]
     ground = projected(_tiles(pose.ground_m, centre), centre)
-    axes.add_collection(LineCollection(list(ground), colors=FAINT, linewidths=0.6))
+    axes.add_collection(LineCollection(list(ground), colors=canvas.FAINT, linewidths=0.6))
     bones = projected(pose.bones_m, centre)
     colours, widths = zip(*(_LIMBS[side] for side in pose.sides), strict=True)
     axes.add_collection(LineCollection(list(bones), colors=colours, linewidths=widths))
     head = projected(pose.head_m, centre)
-    axes.add_patch(Circle(tuple(head), pose.head_radius_m, fc="white", ec=INK, lw=1.4))
+    axes.add_patch(Circle(tuple(head), pose.head_radius_m, fc="white", ec=canvas.INK, lw=1.4))
     markers = projected(pose.markers_m, centre)
-    axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=BLUE, mew=0.8, label="markers")
+    axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=canvas.BLUE, mew=0.8, label="markers")
     points = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
     if np.isfinite([pose.force_N, pose.force_at_m]).all():
         foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
-        arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
+        arrow = {"color": canvas.GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
         points += [foot[None], tip[None]]
     everything = np.concatenate(points)
@@ -60,9 +51,12 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     force = np.linalg.norm(pose.force_N)
-    lines = [plain(trial, _LONGEST) + f", {pose.time_s:.2f} s", "black: right limbs; grey: left"]
+    lines = [
+        canvas.plain(trial, _LONGEST) + f", {pose.time_s:.2f} s",
+        "black: right limbs; grey: left",
+    ]
     lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
-    figure.supxlabel("\n".join(lines), fontsize=7.5, color=SOFT)
+    figure.supxlabel("\n".join(lines), fontsize=7.5, color=canvas.SOFT)
     axes.set_axis_off()
     return figure
 
@@ -95,8 +89,6 @@ _ON_GROUND_PERCENTILE = 2.0
 class Pose:
     """Positions and force in the person's axes (anterior, right, up).
 
-    Attributes
-    ----------
     bones_m : (b, 2, 3) end points; sides : (b,) ``l``, ``r`` or empty.
     head_m : (3,) centre; head_radius_m : its radius. markers_m : (m, 3) as the model carries them.
     force_at_m : (3,) where the ground force acts; force_N : (3,), NaN where it is not measured.

@@ -1,13 +1,15 @@
 """The report of one participant: a first page, and folded sections in the order of questions; here
-those of the recordings and of the parameters."""
+those of what is wrong, of the recordings and of the parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf, isfinite
 
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report import effect_words, records, verdict
 from bsip_cli.report.blocks import (
     WORDS,
     Block,
@@ -18,24 +20,18 @@ from bsip_cli.report.blocks import (
     Heading,
     Numbered,
     Paragraph,
-    Picture,
     Section,
+    picture,
 )
+from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import marker_bars, segment_masses
 from bsip_cli.report.first_page import front
-from bsip_cli.report.participant import diagnosis, errors
-from bsip_cli.report.records import (
-    HowMade,
-    ParticipantRecord,
-    TrialRecord,
-    clock_of,
-    flags_of,
-    how_made,
-)
+from bsip_cli.report.participant import errors
 from bsip_cli.report.words import (
     MISSING,
     ROLES,
+    TEXTS,
     capital,
     count,
     listing,
@@ -48,25 +44,16 @@ from bsip_cli.report.words import (
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
-CANNOT_KNOW = (
-    "A mass behind a spherical joint enters the ground force only together with its neighbour's "
-    "parameters: each mass is an identified combination plus nearness to the table.",
-    "Segments are rigid and joints ideal. Soft tissue, breathing and a bending spine end up in the "
-    "parameters or in what is left.",
-    "An error that is the same in all recordings can hide in the identified parameters.",
-    "Frames are not independent: intervals allow for it.",
-)
 
-
-def participant_document(record: ParticipantRecord) -> Document:
-    made = [Heading("What cannot be known"), Bullets(CANNOT_KNOW)]
-    made += how_made(HowMade.of(record.origins), record.defaults)
+def participant_document(record: records.ParticipantRecord) -> Document:
+    made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
+    made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
         subtitle="Ground forces measured by plates, against those computed from markers.",
         front=front(record),
         sections=(
-            diagnosis.section(record),
+            diagnosis_section(record),
             errors.section(record),
             errors.joints_section(record),
             parameters_section(record),
@@ -86,7 +73,7 @@ _LEVELS = ("excluded", "warning", "corrected")
 _MM = 1000.0
 
 
-def recording_section(record: ParticipantRecord) -> Section:
+def recording_section(record: records.ParticipantRecord) -> Section:
     refused = tuple(f"{r.unit or record.id}, {r.stage}: {r.sentence}" for r in record.refusals)
     blocks: list[Block] = [_trials(record)]
     if refused:
@@ -95,7 +82,7 @@ def recording_section(record: ParticipantRecord) -> Section:
     return Section("recording", "What was recorded?", tuple(blocks))
 
 
-def _trials(record: ParticipantRecord) -> Grid:
+def _trials(record: records.ParticipantRecord) -> Grid:
     head = (
         "recording",
         "role",
@@ -104,23 +91,18 @@ def _trials(record: ParticipantRecord) -> Grid:
         "pose known [%]",
         "markers [mm]",
     )
-    return Grid(
-        head,
-        tuple(_trial_row(trial) for trial in record.trials),
-        "Forces are compared while every foot on the ground stands on a plate. Markers: root mean "
-        "square distance from the model.",
-        words=2,
-    )
+    rows = tuple(_trial_row(trial) for trial in record.trials)
+    return Grid(head, rows, TEXTS["captions"]["trials"], words=2)
 
 
-def _trial_row(trial: TrialRecord) -> tuple[str | Cell, ...]:
+def _trial_row(trial: records.TrialRecord) -> tuple[str | Cell, ...]:
     role = ROLES[trial.role]
     frame = trial.kinematics
     if frame is None or frame.empty:
         return (trial.label, role, MISSING, MISSING, MISSING, MISSING)
     compared = np.nan
-    if trial.reconstruction is not None and len(clock_of(trial.reconstruction)):
-        compared = float(flags_of(trial.reconstruction, "valid").mean())
+    if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
+        compared = float(records.flags_of(trial.reconstruction, "valid").mean())
     rms = frame["marker_rms_m"].to_numpy(dtype=float)
     rms = rms[np.isfinite(rms)]
     return (
@@ -133,20 +115,17 @@ def _trial_row(trial: TrialRecord) -> tuple[str | Cell, ...]:
     )
 
 
-def _loads(record: ParticipantRecord) -> Iterator[Block]:
+def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
     """What the person carried as the study says, and what was made of it."""
     trials_of: dict[str, list[str]] = {}
     for trial, words in record.loads:
         trials_of.setdefault(words, []).append(trial)
     if trials_of:
         carried = "; ".join(f"{words} in {listing(trials)}" for words, trials in trials_of.items())
-        yield Paragraph(
-            f"Known loads, as study.toml states them: {carried}. They are no part of the masses: "
-            "their share of the ground forces was computed as of point masses."
-        )
+        yield Paragraph(TEXTS["loads"].format(carried=carried))
 
 
-def _findings(record: ParticipantRecord) -> Iterator[Block]:
+def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
     """What ingest repaired, warned of or left out: one line per check, with its recordings."""
     found: dict[tuple[str, str, str], dict[str, set[str]]] = {}
     for trial in record.trials:
@@ -177,7 +156,7 @@ def _findings(record: ParticipantRecord) -> Iterator[Block]:
 # --- markers ------------------------------------------------------------------------------------
 
 
-def _markers(record: ParticipantRecord) -> Iterator[Block]:
+def _markers(record: records.ParticipantRecord) -> Iterator[Block]:
     frames = [t.residuals for t in record.trials if t.residuals is not None]
     rows = pd.concat(frames) if frames else pd.DataFrame({"marker": [], "residual_m": []})
     squares = rows["residual_m"].astype(float) ** 2
@@ -188,20 +167,16 @@ def _markers(record: ParticipantRecord) -> Iterator[Block]:
     limit = next(y.limit for y in yardsticks(np.nan, np.nan) if y.name == MARKERS)
     far = [f"{name} ({number(rms[name], 0)} mm)" for name in rms.index[rms > limit]]
     yield Heading("Markers")
-    yield Picture(
-        marker_bars([str(name) for name in rms.index], rms.to_numpy(), limit),
+    yield picture(
         "marker_residuals",
-        "Root mean square distance of each marker from its model, all recordings; the line is the "
-        f"limit of {number(limit, 0)} mm.",
-        "Bars: distance per marker.",
-        "low and even is good. One far above the others has slipped, is exchanged with another, or "
-        "sits where the model does not expect it.",
-        f"look at {listing(far)}." if far else "nothing: none is beyond the limit.",
+        marker_bars([str(name) for name in rms.index], rms.to_numpy(), limit),
         rms.rename("rms_mm").reset_index(),
+        limit=number(limit, 0),
+        action=f"look at {listing(far)}" if far else "nothing: none is beyond the limit",
     )
 
 
-def _events(record: ParticipantRecord) -> Iterator[Block]:
+def _events(record: records.ParticipantRecord) -> Iterator[Block]:
     """What the inverse kinematics says of single markers; nothing where it was not asked."""
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
     lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
@@ -224,12 +199,12 @@ _RATIOS = ("om", "rm_mass", "om_rm_mass")
 _MOST_STEPS = 3
 
 
-def parameters_section(record: ParticipantRecord) -> Section:
+def parameters_section(record: records.ParticipantRecord) -> Section:
     blocks = (*_choice(record), *_masses(record), *_next(record))
     return Section("parameters", "Which segment parameters come out?", blocks)
 
 
-def _choice(record: ParticipantRecord) -> Iterator[Block]:
+def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
     """Nothing where ``choose`` has not run."""
     choice = record.choice
     if choice is None or choice.empty:
@@ -242,20 +217,12 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
             "warning",
         )
     if choice["trials"].iloc[0]:
-        yield Grid(
-            ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings"),
-            tuple(
-                (
-                    row["movement"],
-                    row["use"],
-                    *(_ratio(row, x) for x in _RATIOS),
-                    str(row["trials"]),
-                )
-                for row in choice.to_dict("records")
-            ),
-            "Errors as ratios (below 1: smaller), with one standard error to either side.",
-            words=2,
+        head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
+        rows = tuple(
+            (one["movement"], one["use"], *(_ratio(one, x) for x in _RATIOS), str(one["trials"]))
+            for one in choice.to_dict("records")
         )
+        yield Grid(head, rows, TEXTS["captions"]["choice"], words=2)
 
 
 def _ratio(row: Mapping, name: str) -> str:
@@ -268,7 +235,7 @@ def _ratio(row: Mapping, name: str) -> str:
 # --- parameters ---------------------------------------------------------------------------------
 
 
-def _masses(record: ParticipantRecord) -> Iterator[Block]:
+def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     rm, om = record.method(RM), record.method(OM)
     if om.empty or rm.empty:
         gone = OM if om.empty else RM
@@ -288,16 +255,8 @@ def _masses(record: ParticipantRecord) -> Iterator[Block]:
         dtype=float,
     )
     labelled = shown.rename(index=segment_label)
-    yield Picture(
-        segment_masses(labelled),
-        "masses",
-        "Segment masses by table (RM), by the table times one number (RM+mass) and identified (OM), "
-        "their difference, and how much of each the data decide.",
-        "Points: segment masses; bars: how much the data decide.",
-        "long bars to the right are good: the number is this person's. Short ones: it is the table's.",
-        "do not read a difference into a mass that the data hardly decide.",
-        shown.rename_axis("segment").reset_index(),
-    )
+    numbers = shown.rename_axis("segment").reset_index()
+    yield picture("masses", segment_masses(labelled), numbers)
     shift_mm = 1e3 * np.linalg.norm(om[_COM].to_numpy() - rm[_COM].to_numpy(), axis=1)
     rows = [
         (
@@ -329,7 +288,7 @@ def _masses(record: ParticipantRecord) -> Iterator[Block]:
     )
 
 
-def _next(record: ParticipantRecord) -> Iterator[Block]:
+def _next(record: records.ParticipantRecord) -> Iterator[Block]:
     """What to record to know more."""
     table = record.excitation
     if table.empty:
@@ -349,3 +308,134 @@ def _next(record: ParticipantRecord) -> Iterator[Block]:
                 for row in steps.to_dict("records")
             )
         )
+
+
+# --- what is wrong, and how sure that is: causes, size and effect, what could not be seen ----------
+
+
+_NEAREST = 4  # rejected causes that are listed
+_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
+_FAR = 20.0  # times the largest usual size: not seen at all
+
+
+def diagnosis_section(record: records.ParticipantRecord) -> Section:
+    if record.diagnosis is None or record.detection is None:
+        blocks: tuple[Block, ...] = (Paragraph(verdict.NOT_RUN, "note"),)
+        return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
+    tables = (record.diagnosis, record.detection, record.gains, record.changes)
+    said = verdict.verdict_of(*tables)
+    events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
+    named_from = percent(record.option("diagnosis", "named_from"))
+    blocks = (
+        *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
+        *(Paragraph(text) for text in (*verdict.corrected_sentence(events), *said.results)),
+        *nearest(candidates_of(record.diagnosis)),
+        Heading("What might have gone unseen"),
+        *limit_blocks(record.detection, record.diagnosis),
+        Heading("How this was decided"),
+        Paragraph(TEXTS["how_decided"].format(named_from=named_from)),
+    )
+    return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
+
+
+# --- causes -------------------------------------------------------------------------------------
+
+
+def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
+    """The causes that came nearest to being found."""
+    rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
+    if not rejected:
+        return (Paragraph("No other fault of the catalogue came near."),)
+    rows = tuple(
+        (
+            one.label,
+            verdict.probability_words(one.probability) or MISSING,
+            number(one.rms_change, 1),
+            one.removes(),
+        )
+        for one in rejected
+    )
+    head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
+    return (Grid(head, rows, TEXTS["captions"]["nearest"]),)
+
+
+# --- limits -------------------------------------------------------------------------------------
+
+
+def limit_blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[Block, ...]:
+    """From the artifacts ``detection`` and ``diagnosis``."""
+    together = limits_of(detection, diagnosis)
+    alone = limits_of(detection, diagnosis, alone=True)
+    if not together:
+        return (Paragraph("The limits of detection are not known.", "note"),)
+    rows = tuple(
+        row for effect in effect_words.USUAL for row in _limit_rows(effect, together, alone)
+    )
+    head = ("fault", "in all recordings", "in one alone", "usual in laboratories")
+    caption = TEXTS["captions"]["limits"]
+    return (*_never_seen(detection, diagnosis), Grid(head, rows, caption, words=4))
+
+
+def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
+    """Causes, or parts of them, that these recordings do not show at all; what was found has no
+    limit either."""
+    reported = set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
+    least: dict[str, dict[tuple[str, str], float]] = {}
+    for r in detection.to_dict("records"):
+        if r["effect"] not in reported:
+            parts, part = least.setdefault(r["effect"], {}), (r["target"], r["parameter"])
+            parts[part] = min(r["limit"], parts.get(part, inf))
+    never = []
+    for effect, sizes in least.items():
+        hidden = [part for part, size in sizes.items() if not isfinite(size)]
+        if len(hidden) == len(sizes):
+            never.append(effect_words.effect_title(effect))
+        elif hidden and effect in _BY_PART:
+            places = (
+                (effect_words.place_label(effect, at), effect_words.parameter_label(effect, one))
+                for at, one in hidden
+            )
+            words = "; ".join(", ".join(filter(None, part)) for part in places)
+            never.append(f"{effect_words.effect_title(effect)} ({words})")
+    if not never:
+        return []
+    return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]
+
+
+def _limit_rows(
+    effect: str, together: Sequence[Limit], alone: Sequence[Limit]
+) -> Iterator[tuple[str, ...]]:
+    """A row per unit: the range over all places and directions."""
+    lasting = [x for x in together if x.effect == effect and x.trials > 1]
+    single = [x for x in alone if x.effect == effect]
+    usual = effect_words.USUAL[effect]
+    for unit in dict.fromkeys(x.unit for x in (*lasting, *single)):
+        columns = [
+            [x for x in limits if x.unit == unit and x.parameter in usual.parameters]
+            for limits in (lasting, single)
+        ]
+        if any(isfinite(x.size) for limits in columns for x in limits):
+            yield (
+                effect_words.effect_title(effect),
+                *(_range(effect, limits) for limits in columns),
+                effect_words.usual_words(effect) if usual.unit == unit else MISSING,
+            )
+
+
+def _range(effect: str, limits: Sequence[Limit]) -> str:
+    """``5.0 to 12 mm``; what no usual recording would show is not put in figures."""
+    if not limits:
+        return MISSING
+    best, worst = (end(limits, key=lambda x: x.size) for end in (min, max))
+    usual = effect_words.USUAL[effect]
+    if not isfinite(best.size):
+        return "not at all"
+    if not isfinite(worst.size) or (usual.unit == best.unit and worst.size > _FAR * usual.most):
+        return f"from {best.in_words()}, or not at all"
+    words = [
+        effect_words.size_words(best.parameter, best.unit, size) for size in (best.size, worst.size)
+    ]
+    if words[0] == words[1]:
+        return words[0]
+    first = words[0].removesuffix("°") if words[0].endswith("°") else words[0].partition(" ")[0]
+    return f"{first} to {words[1]}"

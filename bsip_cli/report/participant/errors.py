@@ -8,24 +8,22 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
+from bsip_cli.report import errors
+from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section, picture
 from bsip_cli.report.candidates import effects_in
 from bsip_cli.report.effect_words import effect_title
-from bsip_cli.report.errors import (
-    LEAST_REPORTED_SIZE,
-    Gain,
-    gains_of,
-    one_number_alone,
-    overall_pieces,
-    pieces,
-    pooled_gains,
-    relative_change,
-    size_of,
-)
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
-from bsip_cli.report.words import COMPONENTS, EXTENDED, component_label, count, number, signed
+from bsip_cli.report.words import (
+    COMPONENTS,
+    EXTENDED,
+    TEXTS,
+    component_label,
+    count,
+    number,
+    signed,
+)
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN, is_extended
 from bsip_cli.statistics.samples import Z95
@@ -63,17 +61,9 @@ def _over_time(record: ParticipantRecord) -> Iterator[Block]:
         data |= {f"{column}_{m}": v / scale for m, v in shown.items()}
     seen = flags_of(trial.reconstruction, "used")[window].any()
     fitted = "used to identify, which favours OM" if seen else "not used to identify"
-    yield Picture(
-        curves(panels, 1),
-        "forces",
-        f"{trial.label}: measured (grey) and simulated ground force and centre of pressure (COP), "
-        f"{clock[0]:.1f} to {clock[-1]:.1f} s; data {fitted}.",
-        "Curves over time: measured and simulated.",
-        "the coloured lines should lie on the grey one. A constant distance is a shifted plate or a "
-        "wrong mass, a lag is a delay, spikes at contact are smoothing or soft tissue.",
-        "where they part, look at the recording at that second.",
-        pd.DataFrame(data),
-    )
+    words = {"start": f"{clock[0]:.1f}", "end": f"{clock[-1]:.1f}", "fitted": fitted}
+    numbers = pd.DataFrame(data)
+    yield picture("forces", curves(panels, 1), numbers, trial=trial.label, **words)
 
 
 def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
@@ -104,24 +94,14 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     found = effects_in(record.causes)
     bars = []
     for component in COMPONENTS:
-        size, unit = size_of(record.budget, component)
-        if size >= LEAST_REPORTED_SIZE:
-            parts = pieces(record.budget, component, found)
+        size, unit = errors.size_of(record.budget, component)
+        if size >= errors.LEAST_REPORTED_SIZE:
+            parts = errors.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Whole(name, parts))
     if bars:
-        yield Picture(
-            error_bars(bars, overall_pieces(record.budget, found)),
-            "error_budget",
-            "What makes the error of the table's parameters (RM) in each component, and how large it "
-            "is, over all recordings.",
-            "Bars: shares of the squared error by cause.",
-            "little that is hatched (unknown) is good. What stands left of zero makes the error "
-            "smaller where it is.",
-            "a long bar of segment parameters: use OM. A long hatched bar in a large error: something "
-            "is wrong that has no name here.",
-            record.budget[record.budget["trial"] == ""],
-        )
+        figure = error_bars(bars, errors.overall_pieces(record.budget, found))
+        yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])
 
 
 # --- in figures ---------------------------------------------------------------------------------
@@ -129,19 +109,15 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
 
 def _grid(record: ParticipantRecord) -> Iterator[Block]:
     fits = [(t, t.fit) for t in record.moving_trials() if t.fit is not None]
-    gains = [gain for trial, fit in fits for gain in gains_of(trial.label, fit)]
+    gains = [gain for trial, fit in fits for gain in errors.gains_of(trial.label, fit)]
     known = [gain for gain in gains if gain.component in _SHOWN]
     if not known:
         yield Paragraph("No recording could be compared with both methods.", "warning")
         return
     if not any(gain.held_out for gain in gains):
-        yield Paragraph(
-            "No data were held out: these errors are of the very data that identified the "
-            "parameters, and favour OM.",
-            "warning",
-        )
+        yield Paragraph(TEXTS["nothing_held_out"], "warning")
     yield from _one_number(record, gains)
-    by_trial: dict[str, dict[str, Gain]] = {}
+    by_trial: dict[str, dict[str, errors.Gain]] = {}
     for gain in known:
         by_trial.setdefault(gain.trial, {})[gain.component] = gain
     rows = []
@@ -162,7 +138,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
     )
 
 
-def _cell(gain: Gain | None, method: str) -> Cell:
+def _cell(gain: errors.Gain | None, method: str) -> Cell:
     """The error, marked where it is smaller than those of all others."""
     if gain is None:
         return Cell(number(None))
@@ -171,15 +147,19 @@ def _cell(gain: Gain | None, method: str) -> Cell:
     return Cell(number(own, 1), "better" if own < min(others) * (1.0 - SAME_WITHIN) else "")
 
 
-def _one_number(record: ParticipantRecord, gains: list[Gain]) -> Iterator[Block]:
+def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator[Block]:
     """What one number for the whole mass is, and does without identification."""
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
-    found = [m for m in pooled_gains(held_out) if m.component == "grf_vertical" and RM_MASS in m.of]
+    found = [
+        m
+        for m in errors.pooled_gains(held_out)
+        if m.component == "grf_vertical" and RM_MASS in m.of
+    ]
     if len(rows) and found:
         (mean,) = found
-        over = relative_change(mean.of[RM_MASS], mean.of[OM])
-        said = one_number_alone(
+        over = errors.relative_change(mean.of[RM_MASS], mean.of[OM])
+        said = errors.one_number_alone(
             component_label(mean.component), mean.change(RM_MASS), mean.change(), over
         )
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")
@@ -208,10 +188,7 @@ def _blocks(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph("In no recording are the moments of a hip, knee, ankle, shoulder or elbow "
                         f"determined. {_left_out(trials[0])}", "warning")  # fmt: skip
         return
-    yield Paragraph(
-        "Net moments of all structures across a joint, by the proximal on the distal segment, "
-        "from the forces under each foot. Legs are left out while both feet share a plate."
-    )
+    yield Paragraph(TEXTS["net_moments"])
     yield _picture(trial, joints, record.use())
     for said in largest_changes(all_peaks(trials)):
         yield Paragraph(f"{said}.")
@@ -259,16 +236,8 @@ def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
     axes = {joint: _axis(rows, joint) for joint in joints}
     data = rows[rows["method"].isin(methods) & (rows["axis"] == rows["joint"].map(axes))]
     columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
-    return Picture(
-        curves(panels, 2, 32.0),
-        "joint_moments",
-        f"{trial.label}: moments with the table's parameters (RM) and identified ones (OM), "
-        "with 95 % bands of OM.",
-        "Curves: joint moments over time.",
-        "lines inside one another's band differ by less than can be known.",
-        f"where RM leaves the band, report moments of {use}.",
-        data[columns],
-    )
+    figure = curves(panels, 2, 32.0)
+    return picture("joint_moments", figure, data[columns], trial=trial.label, use=use)
 
 
 def _axis(rows: pd.DataFrame, joint: str) -> str:

@@ -31,15 +31,6 @@ from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 # --- table 3: sway of the measured and the simulated centre of pressure ---------------------------
 
-_SWAY = {
-    "mean_velocity": "MV",
-    "sway_length": "SL",
-    "ellipse_area": "SA",
-    "rms_ap": "RMS AP",
-    "rms_ml": "RMS ML",
-    "rms_ap_origin": "RMS AP (origin)",
-    "rms_ml_origin": "RMS ML (origin)",
-}
 _MARKS = {
     (MEASURED, OM): ("OM M(SD)", "#"),
     (MEASURED, RM): ("RM M(SD)", "*"),
@@ -87,7 +78,7 @@ def _posturography(results: Results, criteria: Criteria) -> Table:
         *paired.against_rm_mass(criteria),
         REASON,
     )
-    named = {t: f"{_SWAY[t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
+    named = {t: f"{model.TEXTS['sway'][t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
     rows = []
     for topic, label in named.items():
         own = {"variable": topic.variable, "label": label, "reason": results.reasons(topic)}
@@ -217,8 +208,6 @@ def build_tables(
 ) -> tuple[Table, ...]:
     """The six tables as data, and the first four next to the published values.
 
-    Parameters
-    ----------
     comparisons : the artifact of ``stats``.
     criteria : the options with which it was computed.
     fitted_on : what each task's data were to OM, as a fact of the values: ``table``, ``task``,
@@ -234,7 +223,7 @@ def build_tables(
         absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
         more = (
             *model.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
-            model.missing(absent),
+            f"Missing: {model.named(absent, '; ')}." if absent else "",
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
     return (*tables, *(published.next_to_published(tag, of_table[tag]) for tag in IN_PRINT))

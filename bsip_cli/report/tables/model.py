@@ -179,8 +179,7 @@ def _rounded(value: float, decimals: int) -> str:
 
 # --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
 
-NAMED_AT_MOST = 6
-"""Missing participants and rows that are named one by one."""
+NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
 
 
 def participants(rows: Iterable[Comparison]) -> str:
@@ -191,32 +190,29 @@ def participants(rows: Iterable[Comparison]) -> str:
     return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
 
 
-_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
 def texts_of(
     name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
 ) -> tuple[str, tuple[str, ...]]:
     """Title and legend of a table; ``more``: what only this one says."""
-    words = _TEXTS["shared"] | more
+    words = TEXTS["shared"] | more
     words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
     words["percent"] = f"{criteria.equivalence_percent:g}"
     words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
+    words["star"] = f"* significant: p < {_level(criteria.alpha)}."
     words["holm"] = _holm_legend(tests, criteria.alpha)
     words["normal"] = (
         f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
         "Wilcoxon's test is the one to read."
     )
-    notes = (note.format(**words) for note in _TEXTS[name]["notes"])
-    return _TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
+    notes = (note.format(**words) for note in TEXTS[name]["notes"])
+    return TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
 
 
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:
     return sign if row.p_value < alpha else ""
-
-
-def star_legend(alpha: float) -> str:
-    return f"* significant: p < {_level(alpha)}."
 
 
 def _holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
@@ -243,15 +239,10 @@ def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ..
                 concerned[row.reason][label] = None
     everyone = set(labels.values())
     return tuple(
-        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else _named([*names])}): "
+        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else named([*names])}): "
         f"{reason}"
         for reason, names in concerned.items()
     )
-
-
-def missing(sentences: Sequence[str]) -> str:
-    """Who is not in the table, and why."""
-    return f"Missing: {_named(sentences, '; ')}." if sentences else ""
 
 
 def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
@@ -273,7 +264,7 @@ def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _named(names: Sequence[str], comma: str = ", ") -> str:
+def named(names: Sequence[str], comma: str = ", ") -> str:
     shown = comma.join(names[:NAMED_AT_MOST])
     more = len(names) - NAMED_AT_MOST
     return f"{shown}{comma}and {more} more" if more > 0 else shown

@@ -6,52 +6,33 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from bsip_cli.report.tables import model
-from bsip_cli.report.tables.model import (
-    Cell,
-    Column,
-    Results,
-    Row,
-    Table,
-    column,
-    count,
-    counts_of,
-    interval,
-    mean_sd,
-    number,
-    p_value,
-    unit_label,
-)
 from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import DATA_SHARE, DIFFERENCE, Comparison, Criteria, Topic
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.published import load_paper
 
-SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}
-"""Methods in the names of CSV columns."""
-
+SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}  # methods in the names of CSV columns
 _PREFIX = {RM: "", RM_MASS: "rm_mass_"}
 """Of the CSV columns with tests of OM against another method."""
 
-_P = {RM: "p", RM_MASS: "p OM, RM+mass"}
-"""Headings of the columns that carry the stars."""
-
-REASON = Column(("reason",))
-_N = column("n", "paired_t.n", "n", count)
+_P = {RM: "p", RM_MASS: "p OM, RM+mass"}  # headings of the columns that carry the stars
+REASON = model.Column(("reason",))
+_N = model.column("n", "paired_t.n", "n", model.count)
 _LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
 _SEGMENTS = ["lower_torso", "upper_torso", "head"]
 _SEGMENTS += [f"{part}_{side}" for limb in _LIMBS for side in "lr" for part in limb]
 """As in table 1 of Hansen 2017; other segments follow."""
 
 
-def means(test: str = "paired_t") -> tuple[Column, ...]:
+def means(test: str = "paired_t") -> tuple[model.Column, ...]:
     """Of the methods; ``test``: the one of OM and RM."""
     numbers = ((OM, test, "a", RM), (RM, test, "b", RM), (RM_MASS, "paired_t", "b", RM_MASS))
     return tuple(
-        column(
+        model.column(
             f"{SHORT[method]}_mean {SHORT[method]}_sd",
             f"{name}.mean_{side} {name}.sd_{side}",
             f"{method} M(SD)",
-            mean_sd(2),
+            model.mean_sd(2),
             (OM, other),
             in_row_unit=True,
         )
@@ -59,27 +40,27 @@ def means(test: str = "paired_t") -> tuple[Column, ...]:
     )
 
 
-def _tests(criteria: Criteria) -> tuple[Column, ...]:
+def _tests(criteria: Criteria) -> tuple[model.Column, ...]:
     """Of OM against RM."""
     confidence = f"{100.0 * (1.0 - criteria.alpha):g}% CI"
     ends = "paired_t.ci_low paired_t.ci_high"
     return (
-        column("difference", "paired_t.difference", in_row_unit=True),
-        column("ci_low ci_high", ends, confidence, interval(2), in_row_unit=True),
-        column("t", "paired_t.statistic", "t", number(2)),
-        column("df", "paired_t.df1"),
-        column("p", "paired_t.p_value", _P[RM], p_value),
-        column("p_holm", "paired_t.p_holm"),
-        column("cohens_d_pooled", "paired_t.effect_size", "Cohen's d", number(2)),
-        column("lilliefors_p", "paired_t.lilliefors_p", "Lilliefors p", p_value),
-        column("wilcoxon_w", "wilcoxon.statistic"),
-        column("wilcoxon_p", "wilcoxon.p_value", "Wilcoxon p", p_value),
-        column("rank_biserial", "wilcoxon.effect_size"),
-        column("d_z", "d_z.effect_size", "d_z", number(2)),
+        model.column("difference", "paired_t.difference", in_row_unit=True),
+        model.column("ci_low ci_high", ends, confidence, model.interval(2), in_row_unit=True),
+        model.column("t", "paired_t.statistic", "t", model.number(2)),
+        model.column("df", "paired_t.df1"),
+        model.column("p", "paired_t.p_value", _P[RM], model.p_value),
+        model.column("p_holm", "paired_t.p_holm"),
+        model.column("cohens_d_pooled", "paired_t.effect_size", "Cohen's d", model.number(2)),
+        model.column("lilliefors_p", "paired_t.lilliefors_p", "Lilliefors p", model.p_value),
+        model.column("wilcoxon_w", "wilcoxon.statistic"),
+        model.column("wilcoxon_p", "wilcoxon.p_value", "Wilcoxon p", model.p_value),
+        model.column("rank_biserial", "wilcoxon.effect_size"),
+        model.column("d_z", "d_z.effect_size", "d_z", model.number(2)),
     )
 
 
-def against_rm_mass(criteria: Criteria) -> tuple[Column, ...]:
+def against_rm_mass(criteria: Criteria) -> tuple[model.Column, ...]:
     """The same tests with RM+mass, of which only p is printed."""
     return tuple(
         replace(
@@ -92,16 +73,18 @@ def against_rm_mass(criteria: Criteria) -> tuple[Column, ...]:
     )
 
 
-def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[Column]:
+def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[model.Column]:
     for other, before in _PREFIX.items():
         counts = f"{before}om_smaller {SHORT[other]}_smaller {before}{n}"
         heading, pair = f"smaller error OM : {other}", (OM, other)
-        yield column(counts, f"sign.count_a sign.count_b {of_n}", heading, counts_of, pair)
-        yield column(f"{before}om_smaller_share", "sign.effect_size", pair=pair)
-        yield column(f"{before}sign_test_p", "sign.p_value", pair=pair)
+        yield model.column(
+            counts, f"sign.count_a sign.count_b {of_n}", heading, model.counts_of, pair
+        )
+        yield model.column(f"{before}om_smaller_share", "sign.effect_size", pair=pair)
+        yield model.column(f"{before}sign_test_p", "sign.p_value", pair=pair)
 
 
-def stars(results: Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
+def stars(results: model.Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
     """Of both p."""
     return {
         heading: model.star(results.find(topic, "paired_t", OM, other), criteria.alpha)
@@ -118,14 +101,7 @@ def task_label(topic: Topic) -> str:
 # --- the tables ---------------------------------------------------------------------------------
 
 _AXES = {"cop_ap": "AP", "cop_ml": "ML"}
-_QUANTITIES = {
-    "cop_error": "COP error",
-    "grf_vertical": "Vertical GRF",
-    "cop_ap": "COP error AP",
-    "cop_ml": "COP error ML",
-}
-"""Groups of rows of table 4; the first two as in print."""
-
+_QUANTITIES: dict[str, str] = model.TEXTS["quantities"]
 _RESIDUALS = {"force_residual": "force", "moment_residual": "moment"}
 _OVER_SEGMENTS = {"mean": "mean", "median": "median", "max": "largest"}
 _COM = "com_"
@@ -134,12 +110,12 @@ _COM = "com_"
 def _paired(
     name: str,
     tests: Sequence[Comparison],
-    columns: tuple[Sequence[Column], Sequence[Column]],
+    columns: tuple[Sequence[model.Column], Sequence[model.Column]],
     named: Mapping[Topic, str],
-    row: Callable[[Topic], tuple[dict[str, Cell], str]],
-    given: tuple[Results, Criteria],
+    row: Callable[[Topic], tuple[dict[str, model.Cell], str]],
+    given: tuple[model.Results, Criteria],
     **more: str,
-) -> Table:
+) -> model.Table:
     """``tests``: whose number is printed. ``columns``: those before the tests of OM, and after them.
     ``named``: the label of each topic, a row each. ``row``: its own values, and its group."""
     results, criteria = given
@@ -149,23 +125,25 @@ def _paired(
     for topic in named:
         own, group = row(topic)
         found = results.values(topic, every) | {"reason": results.reasons(topic)} | own
-        rows.append(Row(found, topic.unit, group, stars(results, topic, criteria)))
+        rows.append(model.Row(found, topic.unit, group, stars(results, topic, criteria)))
     title, legend = model.texts_of(name, results, tests, criteria, **more)
-    star = model.star_legend(criteria.alpha)
-    notes = (star, *legend, *model.not_possible(results, named))
-    return Table(name, title, every, tuple(rows), notes)
+    notes = (*legend, *model.not_possible(results, named))
+    return model.Table(name, title, every, tuple(rows), notes)
 
 
-def segment_mass(results: Results, criteria: Criteria) -> Table:
+def segment_mass(results: model.Results, criteria: Criteria) -> model.Table:
     """Table 1: the masses of the segments."""
     segments = [t for t in results.topics if not t.variable.endswith(DATA_SHARE)]
     segments.sort(key=lambda topic: _segment_rank(topic.variable))
     tests = [results.find(topic, "paired_t") for topic in segments]
 
-    def row(topic: Topic) -> tuple[dict[str, Cell], str]:
+    def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
         of_share = Topic(topic.table, topic.variable + DATA_SHARE, topic.task, topic.role, "1")
         share = results.find(of_share, "description", OM, "")
-        own: dict[str, Cell] = {"mass_data_share": share.mean_a, "mass_data_share_sd": share.sd_a}
+        own: dict[str, model.Cell] = {
+            "mass_data_share": share.mean_a,
+            "mass_data_share_sd": share.sd_a,
+        }
         return own | {"segment": topic.variable}, ""
 
     return _paired(
@@ -173,16 +151,16 @@ def segment_mass(results: Results, criteria: Criteria) -> Table:
         tests,
         (
             (
-                Column(("segment",), "Segment", segment_label, text=True),
-                column("n", "paired_t.n"),
+                model.Column(("segment",), "Segment", segment_label, text=True),
+                model.column("n", "paired_t.n"),
                 *means(),
             ),
             (
-                column("equivalence_bound", "tost.bound", in_row_unit=True),
-                column("equivalence_t", "tost.statistic"),
-                column("equivalence_p", "tost.p_value", "equivalence p", p_value),
-                Column(("mass_data_share",), "data share", number(2)),
-                Column(("mass_data_share_sd",)),
+                model.column("equivalence_bound", "tost.bound", in_row_unit=True),
+                model.column("equivalence_t", "tost.statistic"),
+                model.column("equivalence_p", "tost.p_value", "equivalence p", model.p_value),
+                model.Column(("mass_data_share",), "data share", model.number(2)),
+                model.Column(("mass_data_share_sd",)),
             ),
         ),
         {topic: segment_label(topic.variable) for topic in segments},
@@ -191,11 +169,11 @@ def segment_mass(results: Results, criteria: Criteria) -> Table:
     )
 
 
-def cop_rmse(results: Results, criteria: Criteria) -> Table:
+def cop_rmse(results: model.Results, criteria: Criteria) -> model.Table:
     """Table 2: error of the centre of pressure in the identification sequence."""
     tests = [results.find(topic, "paired_t") for topic in results.topics]
     differ = len({test.n for test in tests}) > 1
-    axis = Column(("axis",), "RMSE", _AXES.__getitem__, text=True)
+    axis = model.Column(("axis",), "RMSE", _AXES.__getitem__, text=True)
     return _paired(
         "table2_cop_rmse",
         tests,
@@ -206,7 +184,7 @@ def cop_rmse(results: Results, criteria: Criteria) -> Table:
     )
 
 
-def cross_validation(results: Results, criteria: Criteria) -> Table:
+def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
     """Table 4: errors of the centre of pressure and of the vertical force by movement."""
     order = list(_QUANTITIES)
     topics = sorted(
@@ -214,13 +192,17 @@ def cross_validation(results: Results, criteria: Criteria) -> Table:
     )
     tests = [results.find(topic, "paired_t") for topic in topics]
 
-    def row(topic: Topic) -> tuple[dict[str, Cell], str]:
-        own: dict[str, Cell] = {"quantity": topic.variable, "task": topic.task, "role": topic.role}
-        group = f"{_QUANTITIES[topic.variable]} [{unit_label(topic.unit)}]"
+    def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
+        own: dict[str, model.Cell] = {
+            "quantity": topic.variable,
+            "task": topic.task,
+            "role": topic.role,
+        }
+        group = f"{_QUANTITIES[topic.variable]} [{model.unit_label(topic.unit)}]"
         return own | {"label": task_label(topic)}, group
 
-    label = Column(("label",), "Movement", text=True)
-    place = [Column((name,)) for name in ("quantity", "task", "role")]
+    label = model.Column(("label",), "Movement", text=True)
+    place = [model.Column((name,)) for name in ("quantity", "task", "role")]
     return _paired(
         "table4_cross_validation",
         tests,
@@ -231,7 +213,7 @@ def cross_validation(results: Results, criteria: Criteria) -> Table:
     )
 
 
-def centres_of_mass(results: Results, criteria: Criteria) -> Table:
+def centres_of_mass(results: model.Results, criteria: Criteria) -> model.Table:
     """Table 6: what identification changes, as Robert 2017 compares it."""
     order = [*_RESIDUALS, *(_COM + name for name in _OVER_SEGMENTS)]
 
@@ -244,23 +226,23 @@ def centres_of_mass(results: Results, criteria: Criteria) -> Table:
     for topic in sorted(results.topics, key=rank):
         name = topic.variable.removeprefix(_COM)
         whose = _RESIDUALS.get(name) or _OVER_SEGMENTS.get(name) or segment_label(name)
-        named[topic] = f"{whose} [{unit_label(topic.unit)}]"
+        named[topic] = f"{whose} [{model.unit_label(topic.unit)}]"
     tests = [results.find(topic, "paired_t") for topic in named if topic.variable in _RESIDUALS]
 
-    def row(topic: Topic) -> tuple[dict[str, Cell], str]:
-        own: dict[str, Cell] = {"variable": topic.variable, "label": named[topic]}
+    def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
+        own: dict[str, model.Cell] = {"variable": topic.variable, "label": named[topic]}
         if topic.variable in _RESIDUALS:
             return own, "Residual"
         apart = results.find(topic, "description", DIFFERENCE, "")
         return own | {"n": apart.n}, "Centres of mass along the segments"
 
     both = "description.mean_a description.sd_a"
-    apart = "apart_mean apart_sd", both, "|OM - RM| M(SD)", mean_sd(2), (DIFFERENCE, ""), True
-    label = Column(("label",), "Quantity", text=True)
+    apart = "apart_mean apart_sd", both, "|OM - RM| M(SD)", model.mean_sd(2), (DIFFERENCE, ""), True
+    label = model.Column(("label",), "Quantity", text=True)
     return _paired(
         "table6_centres_of_mass",
         tests,
-        ((Column(("variable",)), label, _N, *means(), column(*apart)), ()),
+        ((model.Column(("variable",)), label, _N, *means(), model.column(*apart)), ()),
         named,
         row,
         (results, criteria),

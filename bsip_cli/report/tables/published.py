@@ -11,9 +11,7 @@ from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import Paper, PrintedTable, load_paper
 from bsip_cli.statistics.published import Row as PrintedRow
 
-COMPARED = "hansen2017"
-"""The paper whose tables this study's tables 1 to 4 repeat."""
-
+COMPARED = "hansen2017"  # the paper whose tables this study's tables 1 to 4 repeat
 _PAIRED = ("table1", "table2", "table4")
 _METHODS = {"FP": MEASURED, "OM": OM, "RM": RM}  # in print
 _MOVED = "†"

@@ -25,13 +25,7 @@ from bsip_cli.recordings.plate_source import repeated_plates
 from bsip_cli.recordings.scene import Handedness, Stature
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
-from bsip_cli.recordings.written import (
-    AS_WRITTEN,
-    FORCE_UNITS_N,
-    Written,
-    force_unit,
-    likely_paces,
-)
+from bsip_cli.recordings.written import AS_WRITTEN, FORCE_UNITS_N, Written, force_unit, likely_paces
 
 _SURELY_NOBODY = 0.999  # probability from which on no reading is believed
 _LEAST_LIKELY = -12.0  # logarithm: less adds nothing

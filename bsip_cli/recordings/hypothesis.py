@@ -109,15 +109,10 @@ class PlateFit:
         """Mean over the trials."""
         return mean_evidence(self.found)
 
-    def wrenches(self) -> dict[int, np.ndarray]:
-        """Of the loaded samples about the world's origin (n, 6), by trial."""
+    def wrenches(self, smooth: bool = False) -> dict[int, np.ndarray]:
+        """About the world's origin by trial, of the loaded samples (n, 6), or averaged of all."""
         pairs = zip(self.trials, self.matrices, strict=True)
-        return {one.trial: one.parts @ matrix.T for one, matrix in pairs}
-
-    def smooth_wrenches(self) -> dict[int, np.ndarray]:
-        """Of all samples (m, 6), by trial."""
-        pairs = zip(self.trials, self.matrices, strict=True)
-        return {one.trial: one.smooth @ matrix.T for one, matrix in pairs}
+        return {one.trial: (one.smooth if smooth else one.parts) @ m.T for one, m in pairs}
 
 
 def plate_fits(
@@ -228,7 +223,7 @@ class Hypothesis:
     def _totals(self) -> list[np.ndarray]:
         total = [np.zeros((len(trial.body.trial), 6)) for trial in self.trials]
         for fit in self.fits.values():
-            for k, wrench in fit.smooth_wrenches().items():
+            for k, wrench in fit.wrenches(smooth=True).items():
                 total[k] += wrench
         return total
 

@@ -153,11 +153,7 @@ def _spikes(signal: np.ndarray, least: float) -> np.ndarray:
     if not steps.any():
         return spikes
     beside = _beside_cubic(whole)
-    least = max(
-        least,
-        _clear(whole),
-        _SPIKE_NOISE * float(np.median(np.abs(beside))),
-    )
+    least = max(least, _clear(whole), _SPIKE_NOISE * float(np.median(np.abs(beside))))
     for k in np.flatnonzero((np.abs(beside) > least) & known).tolist():
         if 2 <= k < len(signal) - 2:
             first = max(k - _AROUND, 0)
@@ -313,18 +309,12 @@ def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Fi
     """Lines for the quality table about one plate's faulty samples."""
     n, stuck = len(samples.stuck), samples.stuck
     held = "; ".join(
-        f"channel {i + 1} {_times(stuck[:, i], rate_hz)}" for i in np.flatnonzero(stuck.any(axis=0))
+        f"channel {i + 1} {times(stuck[:, i], rate_hz)}" for i in np.flatnonzero(stuck.any(axis=0))
     )
-    lost, repeated = (_times(mask, rate_hz) for mask in (samples.lost, samples.repeated))
+    lost, repeated = (times(mask, rate_hz) for mask in (samples.lost, samples.repeated))
+    said = "none", "marked them unusable", "warning"
     findings = [
-        Finding(
-            check=f"analog_{name}",
-            subject=plate,
-            found=f"{mask.sum()} of {n} samples {words}",
-            expected="none",
-            action="marked them unusable",
-            level="warning",
-        )
+        Finding(f"analog_{name}", plate, f"{mask.sum()} of {n} samples {words}", *said)
         for name, words, mask in (
             ("nan", "are not a number", samples.not_a_number),
             ("clipped", "lie at the converter's limit", samples.clipped),
@@ -337,21 +327,15 @@ def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Fi
     ]
     if samples.silent_channels:
         names = ", ".join(str(i + 1) for i in samples.silent_channels)
-        findings.append(
-            Finding(
-                check="analog_silent",
-                subject=plate,
-                found=f"channel {names} of the plate is zero throughout",
-                expected="a signal that answers to the load",
-                action="kept the plate",
-                level="warning",
-            )
-        )
+        found = f"channel {names} of the plate is zero throughout"
+        answer = "a signal that answers to the load", "kept the plate", "warning"
+        findings.append(Finding("analog_silent", plate, found, *answer))
     return findings
 
 
-def _times(mask: np.ndarray, rate_hz: float) -> str:
-    """When, from the first sample; the first intervals."""
+def times(mask: np.ndarray, rate_hz: float, digits: int = 3, most: int = _NAMED) -> str:
+    """The intervals of True in words, from the first sample; ``most`` of them."""
     intervals = runs(mask)
-    first = ", ".join(f"{a / rate_hz:.3f} to {b / rate_hz:.3f} s" for a, b in intervals[:_NAMED])
-    return first + (f" and {len(intervals) - _NAMED} more" if len(intervals) > _NAMED else "")
+    spans = (f"{a:.{digits}f} to {b:.{digits}f} s" for a, b in intervals[:most] / rate_hz)
+    more = f" and {len(intervals) - most} more" if len(intervals) > most else ""
+    return ", ".join(spans) + more

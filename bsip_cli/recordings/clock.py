@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, GateLimits
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import Opened, PlateSource, later_samples
+from bsip_cli.recordings.plate_source import Opened, later_samples
 from bsip_cli.recordings.scene import by_segment
 from bsip_cli.recordings.written import OTHER_RATE, PACES
 
@@ -69,28 +69,44 @@ class Lags:
 
 def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     """Of a trial, its plates as the file says but for their signs; None where nothing shows it."""
-    recording = opened.recording
-    rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
+    rate_hz = opened.recording.marker_rate_hz
     step = max(1, round(_STEP_S * rate_hz))
     if step / rate_hz > LEAST_S or not opened.sources:
         return None
-    frames = np.arange(0, recording.n_frames, step)
-    body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
-    samples = np.round(frames * analog_hz / rate_hz).astype(int)
-    samples = samples[samples < min(len(source.usable) for source in opened.sources)]
-    total = np.full((len(frames), 6), np.nan)
-    wrenches = [_wrench(one, samples, SMOOTH_S * analog_hz) for one in opened.sources]
-    total[: len(samples)] = np.sum(wrenches, axis=0)
+    body, samples, wrenches = motion_and_forces(opened, step)
     if not np.isfinite(body.rate).any():
         return None
+    total = np.zeros((len(body.rate), 6))
+    total[len(samples) :] = np.nan
+    for source in opened.sources:
+        pushing = wrenches[source.name]
+        pushing[~source.usable[samples]] = np.nan
+        total[: len(samples)] += pushing if np.nansum(pushing[:, 2]) >= 0 else -pushing
     most, near = (round(seconds * rate_hz / step) for seconds in (_MOST_S, 2 * _NEAR_S))
-    most = min(most, len(frames))
+    most = min(most, len(total))
     rough = {k: _goes(body, total, k, limits) for k in range(-2 * (most // 2), most + 1, 2)}
     peaks = [0, *(max(rough, key=lambda k: rough[k][which]) for which in (0, 1))]
     fine = {k for peak in peaks for k in range(peak - near, peak + near + 1)} - rough.keys()
     found = dict(sorted({**rough, **{k: _goes(body, total, k, limits) for k in fine}}.items()))
     seconds = np.array(list(found)) * step / rate_hz
     return Lags(seconds, *np.array(list(found.values())).T)
+
+
+def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
+    """The body at every ``step``-th of the frames; the samples (n,) of the same times, fewer where
+    the plates end before the markers; and each plate's wrench there as the file says, (n, 6),
+    averaged as the body is."""
+    recording = opened.recording
+    rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
+    frames = np.arange(0, recording.n_frames, step)
+    samples = np.round(frames * analog_hz / rate_hz).astype(int)
+    samples = samples[samples < min(len(source.usable) for source in opened.sources)]
+    wrenches = {}
+    for source in opened.sources:
+        parts = source.smoothed(SMOOTH_S * analog_hz).at(samples).parts()
+        wrenches[source.name] = parts @ source.matrix(AS_STATED).T
+    body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
+    return body, samples, wrenches
 
 
 def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, float]:
@@ -126,13 +142,6 @@ def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
     same_way = np.sign(np.log(PACES)) == np.sign(np.log(PACES[best]))
     surely = np.exp(logsumexp(logs[same_way]) - logsumexp(logs))
     return float(PACES[best]) if surely >= percent / 100 else 1.0
-
-
-def _wrench(source: PlateSource, samples: np.ndarray, sigma: float) -> np.ndarray:
-    """As the file says, pushing, (n, 6); NaN at samples that cannot be used."""
-    wrench = source.smoothed(sigma).at(samples).parts() @ source.matrix(AS_STATED).T
-    wrench[~source.usable[samples]] = np.nan
-    return np.asarray(wrench if np.nansum(wrench[:, 2]) >= 0 else -wrench)
 
 
 def _shifted(values: np.ndarray, by: int) -> np.ndarray:

@@ -10,10 +10,11 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.analog import long_runs, runs
+from bsip_cli.recordings.analog import long_runs, runs, times
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.resample import FrameWrench
+from bsip_cli.recordings.under_the_feet import outline
 
 NO_MASS = (
     "whether something else bears the person (seat, box, hands) is not known: neither a stated "
@@ -34,6 +35,7 @@ _MISMATCH_S = 0.1
 _BLINK_S = 0.06  # shorter touches without load are no touch
 _LEAST_WINDOW_S = 0.1
 _TRUNK_CUTOFF_HZ = 6.0
+_SAID = 2, 6  # of times: digits, and so many at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +119,9 @@ def foot_contacts(
         said = ((off, "on the floor beside the plates"), (~foot.seen, "no foot marker seen"))
         for mask, words in said:
             if mask.any():
-                reasons.append(_finding(name, f"{words}: {_times(mask, rate_hz)}"))
+                reasons.append(_finding(name, f"{words}: {times(mask, rate_hz, *_SAID)}"))
     if not usable.all():
-        reasons.append(_finding("", f"force samples unusable: {_times(~usable, rate_hz)}"))
+        reasons.append(_finding("", f"force samples unusable: {times(~usable, rate_hz, *_SAID)}"))
     return FootContacts(measured, on_ground, on_plate, beside, usable, total, tuple(reasons))
 
 
@@ -163,7 +165,7 @@ def contact_windows(
             cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the "
             cause += "time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
-        reasons += (_finding("", f"{force}: {cause} {_times(unexplained, rate_hz)}"),)
+        reasons += (_finding("", f"{force}: {cause} {times(unexplained, rate_hz, *_SAID)}"),)
     return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
 
 
@@ -207,7 +209,7 @@ def _touches(
     sole = foot.height_m < SOLE_HEIGHT_M
     inside = np.zeros(sole.shape, bool)
     for corners in outlines:
-        inside |= inside_outline(foot.position_m, corners[:, :2], _OUTLINE_TOLERANCE_M)
+        inside |= inside_outline(foot.position_m, corners, _OUTLINE_TOLERANCE_M)
     # Every low marker of the foot lies on one plate or another.
     measured = np.all(inside | ~sole, axis=1) if outlines else np.zeros_like(low)
     if len(outlines) < len(plates):
@@ -234,28 +236,14 @@ def _until_toe_off(
 
 
 def inside_outline(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: float) -> np.ndarray:
-    """Points (..., 2) in the rectangle of corners (4, 2) widened by the tolerance."""
-    x, y = corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]
-    offset = points_m - corners_m.mean(axis=0)  # NaN is nowhere inside
-    inside = np.ones(points_m.shape[:-1], bool)
-    for side in (x, y):
-        length = np.linalg.norm(side)
-        along = offset[..., 0] * side[0] / length + offset[..., 1] * side[1] / length
-        inside &= np.abs(along) <= length / 2 + tolerance_m
-    return inside
+    """Points (..., 2) in the rectangle of corners (4, 3) widened by the tolerance."""
+    along, half = outline(points_m, corners_m)  # NaN is nowhere inside
+    return np.asarray((along <= half + tolerance_m).all(axis=-1))
 
 
 def _finding(subject: str, found: str) -> Finding:
     action = "left these frames out"
     return Finding("contacts", subject, found, "every contact on a plate", action, "excluded")
-
-
-def _times(mask: np.ndarray, rate_hz: float, most: int = 6) -> str:
-    """The intervals of True in words."""
-    intervals = runs(mask)
-    words = [f"{a / rate_hz:.2f} to {b / rate_hz:.2f} s" for a, b in intervals[:most]]
-    more = f" and {len(intervals) - most} more" if len(intervals) > most else ""
-    return ", ".join(words) + more
 
 
 # --- the balance of vertical forces ---------------------------------------------------------------

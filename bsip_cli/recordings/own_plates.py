@@ -122,7 +122,7 @@ def _owner(
         assert plate.corners_m is not None
         foot = feet_m[side]
         low = foot[..., 2] - np.percentile(foot[..., 2], 2, axis=0) < SOLE_HEIGHT_M
-        inside = inside_outline(foot[..., :2], plate.corners_m[:, :2], 0.0)
+        inside = inside_outline(foot[..., :2], plate.corners_m, 0.0)
         on[k] = on_ground[side] & (low & inside).any(1)
     owner = np.select([on.all(axis=0), on[0], on[1]], [_SHARED, _LEFT, _RIGHT], default=_NOBODY)
     asked = loaded & (owner == _NOBODY)

@@ -11,11 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.plate_reading import (
-    AS_STATED,
-    FrameChange,
-    PlateReading,
-)
+from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, PlateReading
 from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
 # Of the force: what makers state for a plate's linearity and cross talk. A copy or a sum is the

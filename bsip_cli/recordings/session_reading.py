@@ -18,8 +18,7 @@ from scipy.special import expit, logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
 from bsip_cli.recordings.clock import DELAYED, log_odds_of
-from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
-from bsip_cli.recordings.plate_fit import PlateFit
+from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis, PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import repeated_plates
 from bsip_cli.recordings.scene import Handedness, Stature

@@ -113,14 +113,9 @@ def counted(stamps: Stamps, rates_hz: Sequence[float]) -> tuple[Stamps, tuple[Fi
     rate_hz = next((rate for rate in rates_hz if np.isfinite(rate) and rate > 0), 0.0)
     if not rate_hz or len(stamps.values) < 2 or (stamps.values != stamps.values[0]).any():
         return stamps, ()
-    finding = Finding(
-        check="time",
-        subject="",
-        found=f"all {len(stamps.values)} time stamps are {stamps.values[0]:g}",
-        expected="increasing times",
-        action=f"took {rate_hz:g} Hz, as the header says, and its number of frames",
-        level="warning",
-    )
+    found = f"all {len(stamps.values)} time stamps are {stamps.values[0]:g}"
+    action = f"took {rate_hz:g} Hz, as the header says, and its number of frames"
+    finding = Finding("time", "", found, "increasing times", action, "warning")
     return Stamps(np.arange(len(stamps.values)) / rate_hz), (finding,)
 
 
@@ -160,7 +155,12 @@ def even_grid(
     start, stop = _longest_stretch(steps, step_s, stamps.digits[1])
     if stop - start < 2:
         return None
-    findings = [_torn(steps, start, stop)] if stop - start < len(stamps.values) else []
+    findings = []
+    if stop - start < len(stamps.values):
+        found = f"time stamps with a step of {steps.max():.3g} s (least {steps.min():.3g} s)"
+        expected = f"even steps of {np.median(steps):.4g} s"
+        action = f"kept the longest stretch, samples {start + 1} to {stop} of {len(steps) + 1}"
+        findings.append(Finding("time", "", found, expected, action, "warning"))
     kept = replace(stamps, values=stamps.values[start:stop])
     rate_hz, first_s = _printed_rate(kept, rates_hz, base_hz) or (0.0, 0.0)
     if rate_hz:
@@ -169,13 +169,15 @@ def even_grid(
     elif not np.median(np.diff(kept.values)) > 0:
         return None
     else:
-        rate_hz, time_s, found = _uneven_times(kept.values, stated_hz)
-        findings += found
+        rate_hz, time_s, about = _uneven_times(kept.values, stated_hz)
+        findings += about
         samples_s = kept.values
     if len(time_s) > _JUMP * len(samples_s) + 1 or rate_hz > MOST_HZ:
         return None
     if np.isfinite(stated_hz) and abs(rate_hz / stated_hz - 1) > _AGREE * _NEAR:
-        findings.append(_other_rate(rate_hz, stated_hz))
+        found = f"the header says {stated_hz:g} Hz, the time stamps {rate_hz:.4g} Hz"
+        action = "took the time stamps"
+        findings.append(Finding("rate", "points", found, "one rate", action, "warning"))
     return Grid(time_s, rate_hz, slice(start, stop), samples_s, tuple(findings))
 
 
@@ -268,7 +270,10 @@ def _uneven_times(
     jitter = np.abs(stamps_s - stamps_s[0] - np.arange(len(stamps_s)) / rate_hz).max() * rate_hz
     if jitter > _JITTER:
         rate_hz = float(1 / np.median(steps))
-        findings.append(_uneven(steps, rate_hz))
+        most_ms, least_ms = 1e3 * steps.max(), 1e3 * steps.min()
+        found = f"uneven time stamps, steps of {least_ms:.3g} to {most_ms:.3g} ms"
+        action = f"interpolated at {rate_hz:.4g} Hz"
+        findings.append(Finding("time", "", found, "even steps", action, "corrected"))
     n = int(np.floor((stamps_s[-1] - stamps_s[0]) * rate_hz + _SAME)) + 1
     most = int(_JUMP * len(stamps_s)) + 2  # one more than `even_grid` allows
     return rate_hz, stamps_s[0] + np.arange(min(n, most)) / rate_hz, findings
@@ -293,36 +298,3 @@ def _longest_stretch(steps: np.ndarray, step_s: float, digit_s: float) -> tuple[
     edges = np.concatenate([[0], torn + 1, [len(steps) + 1]])
     longest = int(np.argmax(np.diff(edges)))
     return int(edges[longest]), int(edges[longest + 1])
-
-
-def _other_rate(rate_hz: float, stated_rate_hz: float) -> Finding:
-    return Finding(
-        check="rate",
-        subject="points",
-        found=f"the header says {stated_rate_hz:g} Hz, the time stamps {rate_hz:.4g} Hz",
-        expected="one rate",
-        action="took the time stamps",
-        level="warning",
-    )
-
-
-def _torn(steps: np.ndarray, start: int, stop: int) -> Finding:
-    return Finding(
-        check="time",
-        subject="",
-        found=f"time stamps with a step of {steps.max():.3g} s (least {steps.min():.3g} s)",
-        expected=f"even steps of {np.median(steps):.4g} s",
-        action=f"kept the longest stretch, samples {start + 1} to {stop} of {len(steps) + 1}",
-        level="warning",
-    )
-
-
-def _uneven(steps: np.ndarray, rate_hz: float) -> Finding:
-    return Finding(
-        check="time",
-        subject="",
-        found=f"uneven time stamps, steps of {1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms",
-        expected="even steps",
-        action=f"interpolated at {rate_hz:.4g} Hz",
-        level="corrected",
-    )

@@ -9,9 +9,9 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Body, GateLimits
-from bsip_cli.recordings.clock import lags
+from bsip_cli.recordings.clock import lags, motion_and_forces
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.plate_reading import AS_STATED, FORCES_MOVED, MIRRORS, FrameChange
+from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N, repeated_plates
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
@@ -120,20 +120,14 @@ def _mass_kg(opened: Opened) -> float:
     """What nearly all of the force over the acceleration that it carries comes to at most."""
     if opened.lengths is None or not opened.sources:
         return 0.0
-    recording, names = opened.recording, {one.name: one for one in opened.sources}
-    rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
-    frames = np.arange(0, recording.n_frames, max(1, round(SMOOTH_S * rate_hz)))
-    samples = np.round(frames * analog_hz / rate_hz).astype(int)
-    count = len(opened.sources[0].usable)
-    samples, frames = samples[samples < count], frames[samples < count]
-    repeated = repeated_plates([names])
+    step = max(1, round(SMOOTH_S * opened.recording.marker_rate_hz))
+    body, samples, wrenches = motion_and_forces(opened, step)
+    repeated = repeated_plates([{one.name: one for one in opened.sources}])
     size = np.zeros(len(samples))
-    for name, source in names.items():
+    for name, wrench in wrenches.items():
         if name not in repeated:
-            some = source.smoothed(SMOOTH_S * analog_hz).at(samples)
-            size += np.linalg.norm(some.parts() @ some.matrix(AS_STATED)[:3].T, axis=1)
-    body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
-    needed = GRAVITY_M_S2 + body.rate[:, 2]
+            size += np.linalg.norm(wrench[:, :3], axis=1)
+    needed = GRAVITY_M_S2 + body.rate[: len(samples), 2]
     carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
     loaded = carried[carried > _LOADED * carried.max(initial=0.0)]
     return float(np.percentile(loaded, 90)) if len(loaded) else 0.0

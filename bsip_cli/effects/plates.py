@@ -237,7 +237,7 @@ class PlateRotation(OfPlates):
         "horizontal forces that point aside in proportion to the force on the plate; with"
         " a tilt, a horizontal force in quiet stance"
     )
-    remedy = "stand on the plate, push forwards and sideways, then turn by 90 degrees and repeat"
+    remedy = "push forwards and sideways on the plate, turn yourself by 90 degrees and repeat"
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         plates = plates_of(scene, target)

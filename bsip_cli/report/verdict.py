@@ -204,7 +204,7 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     rest = [text.removeprefix(f"{common}: ") for text in texts]
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))
-        return f"{capital(common)}: either {', '.join(rest)}{_OR_THE_MASS} (probability {mass})."
+        return f"{capital(common)}: either {', '.join(rest)}{_OR_THE_MASS} (probability of the last {mass})."
     ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
     members = [
         "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]

@@ -142,7 +142,7 @@ def test_what_quiet_standing_tells_gives_its_advice_once(found):
     (group,) = causes_of(candidates_of(several))
     assert cause_line(group, TRIALS) == (
         "The plates read 60.0 kg, 2.6 kg less than stated: either a gain, an offset, or the "
-        "stated mass is wrong (probability 33.3 %)."
+        "stated mass is wrong (probability of the last 33.3 %)."
     )
     assert "The measured forces are not the true ones" not in text
 

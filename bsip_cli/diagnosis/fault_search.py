@@ -20,7 +20,7 @@ from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, r
 from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
 from bsip_cli.diagnosis.held_out import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.diagnosis.nameless import UNEXPLAINED
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
 
 _TRIED = 8  # candidates of a round that are fitted in full

@@ -113,8 +113,9 @@ def reading_of_files(
     if of_others := {trials[k].name: trials[other].name for k, other in whose.items()}:
 
         def own(written: Written = AS_WRITTEN) -> list[TrialSamples]:
+            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": None}
             return [
-                replace(one.without(one.sources), lengths=None) if one.name in of_others else one
+                replace(one.without(one.sources), **nothing) if one.name in of_others else one
                 for one in read(written)
             ]
 

@@ -22,6 +22,7 @@ _SLOWER = (1.2, 1.25, 1.5, 5 / 3, 2.0, 2.4, 3.0, 4.0)
 PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
 
 _ALIKE = 0.9  # of trials: markers and forces last as long, where nothing is wrong with their rates
+_COINCIDENCE = 0.01  # of lengths that are cut anyhow: rarer ones are none
 _OF_CHANCE = 0.1  # of trials: one file is cut, at a place that is anywhere in it
 
 
@@ -83,7 +84,9 @@ def of_other_trials(trials: Sequence[Lengths | None]) -> dict[int, int]:
         np.array([getattr(one, name) for one in odd.values()]) for name in ("markers_s", "forces_s")
     )
     near_s = _STEPS * max((one.step_s for one in odd.values()), default=0.0)
-    if len(odd) < 2 or (np.abs(np.sort(markers) - np.sort(forces)) > near_s).any():
+    by_chance = np.minimum(2 * near_s / np.maximum(np.abs(markers - forces), near_s), 1.0).prod()
+    is_other = (np.abs(np.sort(markers) - np.sort(forces)) <= near_s).all()
+    if len(odd) < 2 or not is_other or by_chance > _COINCIDENCE:
         return {}
     whose = [int(np.argmin(np.abs(markers - force_s))) for force_s in forces]
     return {k: list(odd)[one] for k, one in zip(odd, whose, strict=True)}

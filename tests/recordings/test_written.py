@@ -62,6 +62,8 @@ def test_lengths_that_differ_by_one_factor_in_several_trials_are_a_pace():
         (((2.0, 4.0), (5.0, 5.0), (4.0, 2.0)), {0: 2, 2: 0}),
         (((2.0, 3.0), (3.0, 4.5)), {}),  # a rate
         (((2.0, 3.0), (3.0, 2.0), (6.0, 5.0)), {}),  # cut anyhow
+        (((10.0, 10.03), (10.02, 9.99)), {}),  # of one length, one file padded
+        (((10.0, 10.05), (10.06, 10.0), (10.03, 9.98), (9.99, 10.04)), {}),
     ],
 )
 def test_trials_that_have_each_others_forces(pairs, whose):

@@ -75,8 +75,8 @@ def run(unit: Unit) -> None:
     budget, large = error_budget(unit, trials, facts["causes"])
     # large errors, less the trials already reported with an error of unknown cause
     unknown = [f for f in findings if f.effect == UNEXPLAINED and f.verdict == "named"]
-    told = {trial for one in unknown for trial in one.trials}
-    left = [(one, tuple(t for t in one.trials if t not in told)) for one in large]
+    reported = {trial for one in unknown for trial in one.trials}
+    left = [(one, tuple(t for t in one.trials if t not in reported)) for one in large]
     findings = (*(replace(one, trials=trials) for one, trials in left if trials), *findings)
     if not trials:
         unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")

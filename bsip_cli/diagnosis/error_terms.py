@@ -137,13 +137,16 @@ def as_simulated(scene: Scene) -> Scene:
     part of any residual by itself. Each plate bears its part of the vertical force."""
 
     def reading() -> Scene:
-        off, total = scene.measured - scene.predicted, scene.measured[:, 2:3]
-        loaded = total > 0
-        plates = []
-        for one in scene.plates:
-            part = np.where(loaded, one.wrench[:, 2:3], 0.0) / np.where(loaded, total, 1.0)
-            plates.append(replace(one, wrench=one.wrench - part * off))
-        return scene.reading(tuple(plates), scene.predicted)
+        off = scene.measured - scene.predicted
+        loads = [
+            np.fmax(one.wrench[:, 2:3], 0.0) for one in scene.plates
+        ]  # in flight they are noise
+        total = np.maximum(np.sum(loads, axis=0), np.finfo(float).tiny)
+        plates = tuple(
+            replace(one, wrench=one.wrench - load / total * off)
+            for one, load in zip(scene.plates, loads, strict=True)
+        )
+        return scene.reading(plates, scene.predicted)
 
     return scene.once("as simulated", reading)
 

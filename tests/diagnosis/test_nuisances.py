@@ -1,4 +1,6 @@
-"""What is wrong without any effect: a body that drifts, and the spline's own bias."""
+"""What is wrong without any effect: a body that drifts, the spline's own bias, plates in flight."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from scipy.signal import butter, freqs, sosfiltfilt
 from bsip_cli.diagnosis.error_terms import (
     DRIFT_M,
     SKIN_HZ,
+    as_simulated,
     drift,
     smoothing_bias,
     stays_behind,
@@ -47,3 +50,30 @@ def test_tissue_stays_behind_as_what_hangs_on_a_spring_and_a_damper_does():
     expected = courses.T @ courses / len(courses)
     np.testing.assert_allclose(told @ told.T, expected, atol=0.05 * np.abs(expected).max())
     np.testing.assert_allclose(told[:, 0], courses[50], atol=0.05 * np.abs(courses).max())
+
+
+def test_in_flight_no_plate_reads_more_than_is_simulated():
+    """Where plates read noise around zero, their shares of the simulated load stay shares."""
+    rng = np.random.default_rng(4)
+    scene = moving(2.0)
+    plate, whole = scene.plates[0], scene.measured
+    stands = np.arange(len(scene.times_s)) % 2 == 0
+    noise = rng.normal(size=(2, *whole.shape))
+    half = 0.5 * whole * stands[:, None]
+    plates = tuple(replace(plate, name=str(k), wrench=half + x) for k, x in enumerate(noise, 1))
+    scene = replace(scene, plates=plates)
+    off = np.abs(scene.predicted - scene.measured) + 1e-6
+    found = as_simulated(scene).plates
+    for before, after in zip(plates, found, strict=True):
+        assert (np.abs(after.wrench - before.wrench) <= off).all()
+    total = found[0].wrench + found[1].wrench
+    np.testing.assert_allclose(total[stands], scene.predicted[stands], atol=1e-6)
+
+
+def test_a_plate_without_a_reading_leaves_the_others_theirs():
+    scene = moving(2.0)
+    plate = replace(scene.plates[0], wrench=scene.measured)
+    silent = replace(plate, name="2", wrench=np.full_like(plate.wrench, np.nan))
+    first, second = as_simulated(replace(scene, plates=(plate, silent))).plates
+    np.testing.assert_allclose(first.wrench, scene.predicted, atol=1e-6)
+    assert np.isnan(second.wrench).all()

@@ -138,12 +138,10 @@ def as_simulated(scene: Scene) -> Scene:
 
     def reading() -> Scene:
         off = scene.measured - scene.predicted
-        loads = [
-            np.fmax(one.wrench[:, 2:3], 0.0) for one in scene.plates
-        ]  # in flight they are noise
+        loads = [np.maximum(one.wrench[:, 2:3], 0.0) for one in scene.plates]  # flight is noise
         total = np.maximum(np.sum(loads, axis=0), np.finfo(float).tiny)
         plates = tuple(
-            replace(one, wrench=one.wrench - load / total * off)
+            replace(one, wrench=one.wrench - np.nan_to_num(load / total) * off)
             for one, load in zip(scene.plates, loads, strict=True)
         )
         return scene.reading(plates, scene.predicted)

@@ -159,7 +159,7 @@ class _Correction:
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
             elif not named.is_corrected(cause.effect):
-                self.left.append(f"{words}: {named.NO_FAULT_OF_IT}")
+                self.left.append(f"{words}: {named.why_left(cause.effect.name, '')}")
             elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
                 self.left.append(f"{words}: no plate shows where the axes are")
             elif alike and not all(

@@ -14,7 +14,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import Turned
 from bsip_cli.effects.markers import MarkerSwap
-from bsip_cli.effects.plates import ALL, PlateZero
+from bsip_cli.effects.plates import ALL, FrameRate, PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.trial_scene import causes_of
@@ -41,6 +41,8 @@ def why_left(effect: str, unknown: str, group: str = "") -> str:
     if group:
         return "one of several causes that look alike"
     known = EFFECTS.get(effect)
+    if isinstance(known, FrameRate):
+        return "write the rate of the recording into the file, and run again"
     can_be = known is not None and (is_corrected(known) or isinstance(known, MarkerSwap))
     return unknown if can_be else NO_FAULT_OF_IT
 

@@ -8,6 +8,7 @@ from bsip_cli.effects.effect import Effect
 CATALOGUE: tuple[Effect, ...] = (
     plates.SyncOffset(),
     plates.ClockDrift(),
+    plates.FrameRate(),
     plates.PlateTranslation(),
     plates.PlateRotation(),
     plates.PlateGain(),

@@ -129,7 +129,7 @@ class Effect(ABC):
             else p.least + NEAR * p.typical < x < p.most - NEAR * p.typical
             for p, x in bounded
         )
-        return within and all(x >= self.least_named.get(p.name, -np.inf) for p, x in bounded)
+        return within and all(abs(x) >= self.least_named.get(p.name, 0.0) for p, x in bounded)
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""
@@ -179,7 +179,7 @@ def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:
 # --- the units and digits in which people read the sizes of effects -------------------------------
 
 _SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
-_PLAIN_NUMBERS = ("damping_ratio",)
+_PLAIN_NUMBERS = ("damping_ratio", "rate_ratio")
 
 
 def readable_unit(parameter: str, unit: str) -> tuple[float, str]:

@@ -70,8 +70,7 @@ class CameraFrame(Turned):
         weight = scene.mass_kg * GRAVITY_M_S2 * UP
         centre = scene.centre_of_mass_m
         back = Rotation.from_rotvec([-values[0], -values[1], 0.0]).as_matrix().T
-        standing = np.hstack([np.broadcast_to(weight, centre.shape), np.cross(centre, weight)])
-        force, moment = np.split(scene.predicted - standing, 2, axis=1)
+        force, moment = np.split(scene.predicted - scene.at_rest, 2, axis=1)
         moved = centre @ back - centre
         return np.hstack([force @ back - force, moment @ back - moment + np.cross(moved, weight)])
 

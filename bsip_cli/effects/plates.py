@@ -9,12 +9,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 from itertools import permutations
+from types import MappingProxyType
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.effect import Effect, Parameter, Reported
 from bsip_cli.effects.scene import Plate, Scene
 
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -358,6 +359,29 @@ class ClockDrift(Delay):
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         order = "slower" if values[0] > 0 else "faster"
         return f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"
+
+
+class FrameRate(Effect):
+    """Recordings at another rate than the file states.
+
+    Markers and plates keep step, so only what accelerates is too large or too small.
+    """
+
+    name = "frame_rate"
+    is_of_laboratory = True
+    numbers = (Parameter("faster", "1", -0.6, 1.5, 0.1),)
+    looks = "forces that are smaller or larger than the movement needs, the more, the faster it is"
+    remedy = "let a marker fall: 1.2 m take half a second"
+    least_named = MappingProxyType({"faster": 0.04})  # rates in use differ more: 240 and 250 Hz
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return ((1 + values[0]) ** 2 - 1) * (scene.predicted - scene.at_rest)
+
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        return (("rate_ratio", "1", 1 + float(values[0])),)
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        return f"all was recorded at {1 + values[0]:.3g} times the rate that the file states"
 
 
 def corrected(scene: Scene, late_s: np.ndarray) -> np.ndarray:

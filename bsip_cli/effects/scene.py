@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, resample, sosfiltfilt
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.ground_wrench import (
     WrenchResponse,
@@ -20,7 +21,7 @@ from bsip_cli.dynamics.ground_wrench import (
     predicted_wrench,
     wrench_response,
 )
-from bsip_cli.dynamics.segment_motion import Point, SegmentMotion, segment_motion
+from bsip_cli.dynamics.segment_motion import UP, Point, SegmentMotion, segment_motion
 from bsip_cli.motion.inverse_kinematics import (
     PoseResponse,
     marker_trust,
@@ -73,7 +74,7 @@ class Plate:
 
 _OF_THE_MOTION = {
     *("rate_hz", "model", "predicted", "motion", "response", "trust", "pose_response"),
-    *("markers_m", "model_markers_m", "centre_of_mass_m"),
+    *("markers_m", "model_markers_m", "centre_of_mass_m", "at_rest"),
 }
 
 
@@ -229,6 +230,13 @@ class Scene:
         masses, moments = self.phi[::10], self.phi.reshape(-1, 10)[:, 1:4]
         total = np.einsum("i,fix->fx", masses, p) + np.einsum("fixy,iy->fx", R, moments)
         return total / masses.sum()
+
+    @cached_property
+    def at_rest(self) -> np.ndarray:
+        """(N, 6) wrench about the world's origin that each pose would need at rest [N, N m]."""
+        weight = self.mass_kg * GRAVITY_M_S2 * UP
+        centre = self.centre_of_mass_m
+        return np.hstack([np.broadcast_to(weight, centre.shape), np.cross(centre, weight)])
 
     def point(self, segment: str, offset_m: np.ndarray) -> Point:
         """A point fixed in a segment, ``offset_m`` (3,) from the segment's origin."""

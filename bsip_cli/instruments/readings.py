@@ -101,6 +101,12 @@ class Instruments:
         """At which frame of these ones those of a part of it begin."""
         return round((cut.start_s - self.start_s) * self.marker_hz)
 
+    def said_slower(self, times: float) -> Instruments:
+        """The same samples, said to be so many times slower than they are."""
+        stamps = None if self.stamps_s is None else times * self.stamps_s
+        slower = self.marker_hz / times, self.analog_hz / times
+        return replace(self, marker_hz=slower[0], analog_hz=slower[1], stamps_s=stamps)
+
     def with_forces_from(self, times_s: np.ndarray) -> Instruments:
         """At each sample the reading of another time; frames without such a reading are cut.
 

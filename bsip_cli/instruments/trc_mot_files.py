@@ -62,8 +62,9 @@ def rewrite_trc_mot(
     scale = _scale_m(markers, trc)
     before = _instruments(markers, forces, sets, scale, trc)
     after = change(before)
-    moved = not np.array_equal(before.points_m, after.points_m, equal_nan=True)
-    loaded = not np.array_equal(before.readings, after.readings, equal_nan=True)
+    other_rate = before.marker_hz != after.marker_hz
+    moved = other_rate or not np.array_equal(before.points_m, after.points_m, equal_nan=True)
+    loaded = other_rate or not np.array_equal(before.readings, after.readings, equal_nan=True)
     _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
     _write(
         copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
@@ -248,8 +249,13 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
     values[:, 2 : 2 + 3 * count] = after.points_m.reshape(frames, -1) / scale
     head = list(table.head)
     names, facts = head[1].split("\t"), head[2].split("\t")
-    pairs = zip(names, facts, strict=False)
-    facts = [str(frames) if name == "NumFrames" else fact for name, fact in pairs]
+    slower = before.marker_hz / after.marker_hz
+    values[:, 1] *= slower
+    for k, (name, fact) in enumerate(zip(names, facts, strict=False)):
+        if name == "NumFrames":
+            facts[k] = str(frames)
+        elif name.endswith("Rate") and slower != 1:
+            facts[k] = f"{_number(fact) / slower:.9g}"
     head[2] = "\t".join(facts)
     rows = ["\t".join([f"{row[0]:.0f}", *map(_cell, row[1:])]) for row in values]
     return "\n".join([*head, *rows]) + "\n"
@@ -268,6 +274,7 @@ def _new_mot(
         values[:, [*each.force, *each.point, *each.torque]] = _with_reading(
             values, each, plate, reading, after.up
         )
+    values[:, 0] *= before.marker_hz / after.marker_hz
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
     head[-2:-2] = said  # before the line endheader and the names
     rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]

@@ -365,13 +365,15 @@ class Measurement:
     channels : (samples, 6 per plate) N and N mm in each plate's frame, not yet quantised.
     pose : where the walkway lies in the lab (truth).
     start_s : of the first frame on the movement's clock (truth).
+    marker_hz, analog_hz : as the file states them.
     """
 
     labels: list[str]
     points_m: np.ndarray
     channels: np.ndarray
     plates: list[Plate]
-    rates: Rates
+    marker_hz: float
+    analog_hz: float
     pose: Pose
     start_s: float
 
@@ -413,8 +415,16 @@ def measure_trial(
     noise = np.repeat([richness.force_noise_n, richness.moment_noise_nm], 3)
     unit = np.repeat([1.0, MM], 3)
     noisy = [unit * (r + noise * rng.standard_normal(r.shape)) for r in delivered.readings]
-    points, start = delivered.points_m, delivered.start_s
-    return Measurement(list(delivered.labels), points, np.hstack(noisy), plates, rates, pose, start)
+    return Measurement(
+        labels=list(delivered.labels),
+        points_m=delivered.points_m,
+        channels=np.hstack(noisy),
+        plates=plates,
+        marker_hz=delivered.marker_hz,
+        analog_hz=delivered.analog_hz,
+        pose=pose,
+        start_s=delivered.start_s,
+    )
 
 
 def write_trial(
@@ -424,13 +434,13 @@ def write_trial(
 
     quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
     """
-    rates, parameters = measurement.rates, ("RATE", "LABELS", "DESCRIPTIONS", "UNITS")
+    parameters = ("RATE", "LABELS", "DESCRIPTIONS", "UNITS")
     c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
     said, units = [f"Force plate {name[-1]}" for name in names], ["N"] * 3 + ["Nmm"] * 3
     for group, *values in (
-        ("POINT", [float(rates.marker_hz)], labels, labels, ["mm"]),
-        ("ANALOG", [float(rates.analog_hz)], names, said, units * len(plates)),
+        ("POINT", [float(measurement.marker_hz)], labels, labels, ["mm"]),
+        ("ANALOG", [float(measurement.analog_hz)], names, said, units * len(plates)),
     ):
         for name, value in zip(parameters, values, strict=True):
             c3d["parameters"][group][name]["value"] = value

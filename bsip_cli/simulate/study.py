@@ -194,7 +194,7 @@ def _trial_record(
     inside = (span for span in spans if span[1] > 0.0 and span[0] < length)
     return {
         "seed": seed,
-        "duration_s": len(measurement.points_m) / measurement.rates.marker_hz,
+        "duration_s": len(measurement.points_m) / measurement.marker_hz,
         "recorded_from_s": measurement.start_s,
         "effects": [effect.name for effect in effects],
         "ball": held,

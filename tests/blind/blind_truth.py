@@ -164,6 +164,7 @@ def _plate(record: Record) -> str:
 MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = {
     "sync_offset": _sized("delay"),
     "clock_drift": _sized("rate_error"),
+    "frame_rate": lambda record, trial: ("", {"rate_ratio": 1 + record["size"]}),
     "plate_translation": _vector(("x", "y", "z"), "shift_m", _plate),
     "plate_rotation": _vector(("tilt_x", "tilt_y", "yaw"), "turn_rad", _plate),
     "plate_gain": _channel("gain", signed=False),

@@ -14,10 +14,10 @@ from tests.effects.every_effect import assert_tangent_is_the_derivative, some, v
 from tests.effects.moving_scene import moving
 
 VOCABULARY = """
-sync_offset clock_drift plate_translation plate_rotation plate_gain plate_crosstalk plate_zero
-plate_drift gravity_tilt added_mass released_object wobbling_mass breathing unmeasured_contact
-joint_centre missing_joint marker_shift marker_swap over_smoothing segment_inertia implement
-camera_frame external_force object_handled marker_slide
+sync_offset clock_drift frame_rate plate_translation plate_rotation plate_gain plate_crosstalk
+plate_zero plate_drift gravity_tilt added_mass released_object wobbling_mass breathing
+unmeasured_contact joint_centre missing_joint marker_shift marker_swap over_smoothing
+segment_inertia implement camera_frame external_force object_handled marker_slide
 """
 UNITS = {"m", "rad", "1", "s", "Hz", "kg", "kg m", "kg m2", "N", "N m", "N/s", "N m/s"}
 EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]

@@ -14,6 +14,7 @@ from bsip_cli.dynamics.ground_wrench import centre_of_pressure, pinocchio_model,
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.plates import (
     ClockDrift,
+    FrameRate,
     PlateCrosstalk,
     PlateDrift,
     PlateGain,
@@ -233,6 +234,22 @@ def test_forces_that_come_late(effect):
     assert rms(expected).max() > 1.0
 
 
+@pytest.mark.parametrize("faster", [-0.3, 0.25])
+def test_a_file_that_states_another_rate(faster):
+    """Positions are right; speeds and accelerations are those of another pace."""
+    swing, times = Swing(pinocchio_model(standing().person), standing().q, 3, 0.4), 0.3
+    q, v, a = (
+        np.stack([f(t) for t in times + np.arange(200) / RATE_HZ])
+        for f in (swing.q, swing.v, swing.a)
+    )
+    true, seen = scene_of(q, v, a), scene_of(q, v / (1 + faster), a / (1 + faster) ** 2)
+    change = FrameRate().change(seen, "", np.array([faster]))
+    np.testing.assert_allclose(seen.predicted + change, true.predicted, atol=1e-6)
+    assert rms(change).max() > 1.0
+    assert not FrameRate().possible(seen, "", np.array([0.02 * np.sign(faster)]))
+    assert FrameRate().possible(seen, "", np.array([faster]))
+
+
 def test_what_the_motion_does_wrong_makes_no_delay_smaller():
     """A spline through so few samples would draw half a frame's delay towards none."""
     scene = moving()
@@ -247,6 +264,7 @@ def test_words_for_the_order_of_clocks():
     scene, delay = standing_still(), SyncOffset()
     assert delay.sentence(scene, "", np.array([0.01])).endswith("10.0 ms after the markers")
     assert delay.sentence(scene, "", np.array([-0.01])).endswith("10.0 ms before the markers")
+    assert "at 0.833 times" in FrameRate().sentence(scene, "", np.array([1 / 1.2 - 1]))
     assert "1000 ppm slower" in ClockDrift().sentence(scene, "", np.array([1e-3]))
 
 

@@ -72,3 +72,12 @@ def test_opensim_reads_the_rewritten_files(tmp_path):
     assert np.allclose(vertical, force[:, 1] + MORE[1], atol=1e-5)
     assert opensim.Storage(str(copy.with_suffix(".mot"))).getSize() == COUNT
     assert opensim.MarkerData(str(copy)).getNumFrames() == COUNT
+
+
+def test_another_rate_is_stated_in_both_files(tmp_path):
+    copy = rewritten(tmp_path, lambda before: before.said_slower(1.25))[0]
+    forces = np.loadtxt(copy.with_suffix(".mot"), skiprows=5 + len(SAID))
+    markers = [line.split("\t") for line in copy.read_text().splitlines()]
+    assert np.allclose(forces[:, 0], np.arange(COUNT) / 80, atol=1e-6)
+    assert [float(row[1]) for row in markers[-COUNT:]] == pytest.approx(np.arange(COUNT) / 80)
+    assert markers[2][:2] == ["80", "80"]

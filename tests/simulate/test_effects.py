@@ -32,8 +32,9 @@ G = 9.81
 PERSON_SEED = 3
 DURATION_S = {"static": 3.0, "squat": 4.0, "hops": 4.0, "stepon": 9.0}
 SIZES_OF_EFFECTS = """
-sync_offset 0.02, clock_drift 0.002, plate_translation 0.01, plate_rotation 0.03, plate_gain 0.03,
-plate_crosstalk 0.02, plate_zero 10.0, plate_drift 1.0, gravity_tilt 0.02, added_mass 3.0,
+sync_offset 0.02, clock_drift 0.002, frame_rate 0.2, plate_translation 0.01, plate_rotation 0.03,
+plate_gain 0.03, plate_crosstalk 0.02, plate_zero 10.0, plate_drift 1.0, gravity_tilt 0.02,
+added_mass 3.0,
 released_object 2.0, wobbling_mass 3.0, breathing 0.05, unmeasured_contact 60.0,
 joint_centre 0.03, missing_joint 0.3, marker_shift 0.03, marker_swap 1.0, over_smoothing 2.0,
 segment_inertia 0.4, implement 0.5, camera_frame 0.02, external_force 60.0, object_handled 2.0,
@@ -152,7 +153,7 @@ def test_some_effects_spare_the_static_trial_unless_told_otherwise():
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_is_seen_in_a_recording(name):
-    """Somewhere in forces or markers, well above rounding, and with the effect's own size."""
+    """In forces, markers or their rate, well above rounding, and with the effect's own size."""
     person = person_of(PERSON_SEED)
     effect = effect_of(name)
     rng = np.random.default_rng([PERSON_SEED, 7])
@@ -166,7 +167,8 @@ def test_every_effect_is_seen_in_a_recording(name):
     frames = min(len(got.points_m), len(null.points_m))
     force = readings(got)[: 10 * frames] - readings(null)[: 10 * frames]
     markers = np.nan_to_num(got.points_m[:frames] - null.points_m[:frames])
-    assert np.abs(force).max() > 0.1 or np.abs(markers).max() > 1e-3
+    other_rate = got.marker_hz != null.marker_hz
+    assert np.abs(force).max() > 0.1 or np.abs(markers).max() > 1e-3 or other_rate
     assert np.isfinite(force).all()
     assert effect.record()["effect"] == name
 
@@ -250,6 +252,13 @@ def test_a_drifting_clock_loses_its_rate_times_the_time():
     expected = np.interp(times * (1.0 - rate), np.arange(len(null)) / 1000.0, null[:, 2])
     assert drift.start_s == 0.0
     assert np.abs(readings(drift)[:, 2] - expected).max() < 0.01
+
+
+def test_another_rate_is_stated_of_the_same_samples():
+    null, other = measured_with("squat"), measured_with("squat", ("frame_rate", 0.25, ""))
+    np.testing.assert_array_equal(other.points_m, null.points_m)
+    np.testing.assert_array_equal(readings(other), readings(null))
+    assert (other.marker_hz, other.analog_hz) == (0.8 * null.marker_hz, 0.8 * null.analog_hz)
 
 
 def test_interpolation_is_exact_for_cubics_and_keeps_losses_local():
@@ -431,7 +440,7 @@ def test_a_marker_slides_within_its_window_and_stays_on_its_segment():
     plain, slid = measured_with("squat"), measured_with("squat", sliding)
     column = plain.labels.index("RELB")
     off = np.linalg.norm(slid.points_m - plain.points_m, axis=2)
-    times = np.arange(len(off)) / plain.rates.marker_hz
+    times = np.arange(len(off)) / plain.marker_hz
     start, end = (share * times[-1] for share in effect_of(*sliding).window_share)
     assert not np.delete(off, column, axis=1).any()
     assert off[times < start, column].max() < 1e-9
@@ -620,7 +629,7 @@ def channel_of(name: str, size: float, column: int, target: str = "") -> tuple[n
     rest = [c for c in range(6) if c != column]
     if name != "outside_clock_jump":
         np.testing.assert_allclose(plain.channels[:, rest], other.channels[:, rest], atol=1e-6)
-    times = np.arange(len(plain.channels)) / plain.rates.analog_hz
+    times = np.arange(len(plain.channels)) / plain.analog_hz
     return plain.channels[:, column], other.channels[:, column], times
 
 

@@ -37,6 +37,13 @@ class ClockDrift(Effect, name="clock_drift"):
         return instruments.with_forces_from(instruments.sample_times_s() * (1.0 - self.size))
 
 
+class FrameRate(Effect, name="frame_rate"):
+    """All was recorded at 1 + `size` times the rate that the file states."""
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        return instruments.said_slower(1.0 + self.size)
+
+
 # --- plates ---------------------------------------------------------------------------------------
 
 

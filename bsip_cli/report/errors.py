@@ -119,22 +119,25 @@ def use_sentence(
     if choice is None or choice.empty:
         return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
-    said = f"{use} {TEXTS['methods_in_full'][str(first['use'])]}{_compared(first)}."
     others = [
-        f"For {listing(list(rows['movement']))} use {method}: OM is "
-        f"{'' if method == OM else 'not '}clearly better there."
+        f"{TEXTS['methods'][str(method)]} for {listing(list(rows['movement']))}, where OM is "
+        f"{'' if method == OM else 'not '}clearly better"
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
+    rest = " for all other movements" if others else ""
+    most = f"{TEXTS['methods_in_full'][str(first['use'])]}{rest}"
+    said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
     rare = identification[identification["rare"].astype(bool)]
     warned = [
         f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
     ]
-    return " ".join([said, *others, *warned])
+    return " ".join([said, *warned])
 
 
-def _compared(first: pd.Series) -> str:
-    """What the choice rests on, to go on with after the method's name."""
+def _compared(first: pd.Series, together: bool) -> str:
+    """What the choice rests on, to go on with after the method's name; ``together``: over movements
+    of which some ask for another method."""
     if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
         return ": no recording is left to judge OM by"
     om, scaled, over_scaled = (
@@ -145,6 +148,7 @@ def _compared(first: pd.Series) -> str:
         "whole_trials": f"in {count(n, 'other recording')} ",
         "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
+    where = f"{where}all together " if together and n > 1 else where
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
     table, times = "RM (table)", "RM+mass (table, masses times one number)"
@@ -185,16 +189,21 @@ Best Practices)."""
 @dataclass(frozen=True)
 class Yardstick:
     """``good`` and ``limit`` in ``unit``: up to the one it is as good as published, beyond the
-    other it is large."""
+    other it is large. ``brief``: its title where many stand in a line."""
 
     name: str
     title: str
+    brief: str
     unit: str
     good: float
     limit: float
 
     def in_sentence(self) -> str:
         return f"{self.title[:1].lower()}{self.title[1:]}"
+
+    def short(self) -> str:
+        """Before its size."""
+        return self.in_sentence().removesuffix(" error")
 
     def words(self, value: float) -> str:
         if not np.isfinite(value):
@@ -203,8 +212,9 @@ class Yardstick:
             return "large"
         return "good" if value <= self.good else "ordinary"
 
-    def scale(self, value: float) -> Scale:
-        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
+    def scale(self, value: float, other: str = "") -> Scale:
+        """On a scale from nothing to a fixed multiple of the limit, in every report the same.
+        ``other``: what other parameters give, in words."""
         end = ENDS_AT * self.limit
         return Scale(
             self.title,
@@ -216,6 +226,7 @@ class Yardstick:
             f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
             f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
             bool(value > end),
+            "" if self.name == MARKERS else other,
         )
 
 
@@ -224,9 +235,11 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
     cop = _published("cop_error"), 1e3 * cop_limit_m
     force = _published("grf_vertical"), force_limit_percent
     return (
-        Yardstick(COP, "Centre of pressure (COP) error", "mm", *cop),
-        Yardstick(FORCE, "Vertical force error", "% of body weight", *force),
-        Yardstick(MARKERS, "Markers from model", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
+        Yardstick(COP, "Centre of pressure (COP) error", "COP", "mm", *cop),
+        Yardstick(FORCE, "Vertical force error", "vertical force", "% of body weight", *force),
+        Yardstick(
+            MARKERS, "Markers from model", "markers", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM
+        ),
     )
 
 

@@ -11,26 +11,26 @@ import numpy as np
 from bsip_cli.report import blocks, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, analysed, effects_in, is_large
 from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.errors import (
-    COP_LIMIT_M,
-    ENDS_AT,
-    FORCE_LIMIT_PERCENT,
-    MARKERS,
-    SOURCES,
-    Yardstick,
-    errors_of,
-    overall_pieces,
-    use_sentence,
-    yardsticks,
+from bsip_cli.report.errors import ENDS_AT, MARKERS, SOURCES, overall_pieces, use_sentence
+from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.recordings import (
+    beyond,
+    large_finding,
+    light_for,
+    measured_of,
+    use_lines,
+    worst_of,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
+from bsip_cli.statistics.methods import RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 2  # causes, and things to do
+_MOST = 2  # findings of the diagnosis
+_MOST_TO_DO = 3
 _POSES = 8  # among which the one is chosen that is shown
 _SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 
@@ -38,44 +38,24 @@ _SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
     light = light_for(record)
+    has_findings = record.causes or large_finding(record)
     return (
         *portrait(record),
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
-        replace(light, text="") if record.causes and large_errors(record) else light,
+        replace(light, text="") if has_findings and light.state == "large" else light,
         blocks.Paragraph(_SIGNS, "note"),
         *_causes(record),
-        *budget_bar(record),
-        blocks.Heading("How large are the errors?"),
-        blocks.Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        blocks.Paragraph(
-            f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
-            f"{ENDS_AT:g} × large. {SOURCES}",
-            "note",
-        ),
+        *_sizes(record),
         *_sure(record, light),
-        blocks.Heading("Which parameters to use"),
+        blocks.Heading("What may be used?"),
+        blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
             use_sentence(record.choice, record.identification, light.state == "large")
         ),
         blocks.Heading("What to do next"),
         blocks.Bullets(tuple(to_do(record, light))),
     )
-
-
-def light_for(record: ParticipantRecord) -> blocks.Light:
-    """The answer, as `bsip show` prints it too."""
-    large = large_errors(record)
-    return verdict.light_of(record.diagnosis, record.detection, record.budget, large, record.use())
-
-
-def large_errors(record: ParticipantRecord) -> list[str]:
-    """The yardsticks beyond which the errors are."""
-    return [
-        f"{one.in_sentence().removesuffix(' error')} {number(value)} {one.unit}"
-        for one, value in measured_of(record)
-        if one.words(value) == "large"
-    ]
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -89,10 +69,8 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     names = [trial.task for trial in record.trials]
     times = {name: names.count(name) for name in names}
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
-    dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
-    saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     short = abbreviations(names)
-    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}{saved}"
+    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}"
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
@@ -133,16 +111,24 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 
 
 def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """A line per cause that was found, the most probable first."""
+    """A line per finding, the most important first; of those that have no room what they are."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    lines = tuple(verdict.cause_line(cause, everywhere) for cause in record.causes)
+    peaks = all_peaks(record.trials)
+    lines = [*large_finding(record)]
+    lines += [
+        verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
+        for cause in record.causes[:_MOST]
+    ]
     if lines:
-        yield blocks.Numbered(lines[:_MOST])
-    if len(lines) > _MOST:
-        more = f"{count(len(lines) - _MOST, 'more finding')} below"
-        yield blocks.Links("", ((more, f"#{verdict.ALL_FAULTS}"),))
+        yield blocks.Numbered(tuple(lines))
+    if more := record.causes[_MOST:]:
+        words = [" or ".join(verdict.titles(cause)) for cause in more]
+        times = {one: words.count(one) for one in words}
+        named = [one if n == 1 else f"{n} × {one}" for one, n in times.items()]
+        address = ((f"{count(len(more), 'more finding')} below", f"#{verdict.ALL_FAULTS}"),)
+        yield blocks.Links("", address, f": {'; '.join(named)}.")
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -154,13 +140,34 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     if light.state == "large":
         unknown = ", its cause is not known" if verdict.CAUSE_UNKNOWN in light.title else ""
         said.append(f"That the error is large is certain{unknown}.")
-    if any(not is_large(cause) for cause in record.causes):
-        said.append("Each fault states its own probability.")
-    elif light.state != "large":
+    if not record.causes and light.state != "large":
         said.append("No fault is more probable than not.")
-    yield blocks.Heading("How sure is this?")
+    said.append(verdict.unseen(record.detection, record.diagnosis))
+    if text := " ".join(filter(None, said)):
+        yield blocks.Heading("How sure is this?")
+        yield blocks.Paragraph(text)
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
+    """The yardsticks, what makes the error, and of which parameters each of both is."""
+    use = record.use()
+    bar = tuple(budget_bar(record))
+    is_other = bool(bar) and use != RM
+    table = {one.name: size for one, size in measured_of(record, RM)}
+    scales = [
+        one.scale(size, f"with {RM} {number(table[one.name])}" if is_other else "")
+        for one, size in measured_of(record)
+    ]
+    shown = TEXTS["shown"]["each" if is_other else "both" if bar else "scales"]
+    yield blocks.Heading(f"How large are the errors{', and what makes them' if bar else ''}?")
+    yield blocks.Paragraph(shown.format(use=METHODS[use], table=METHODS[RM]))
+    yield blocks.Scales(tuple(scales))
+    yield from bar
     yield blocks.Paragraph(
-        " ".join((*said, verdict.unseen(record.detection, record.diagnosis))).rstrip()
+        f"Root mean squares (RMS). Scales end at {ENDS_AT:g} × large. {SOURCES}", "note"
     )
 
 
@@ -169,55 +176,41 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
-        yield blocks.Bar(
-            "What makes the squared error of the forces with a table's parameters (RM)", pieces
-        )
-
-
-# --- how large ----------------------------------------------------------------------------------
-
-
-def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...]:
-    """The three yardsticks with this person's numbers, by the method that is to be used."""
-    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
-    values = errors_of(fits, record.use()) | {MARKERS: 1e3 * float(record.facts["marker_rms_m"])}
-    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
-    return tuple((one, values[one.name]) for one in yardsticks(*limits))
+        yield blocks.Bar(f"What makes the squared error with {METHODS[RM]}", pieces)
 
 
 # --- what to do ---------------------------------------------------------------------------------
 
 
 def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
-    """Whether the data may be used, and at most two things to do."""
-    causes = record.causes
+    """At most three things."""
+    causes, first = record.causes, 1 + len(large_finding(record))
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
-    said = [TEXTS["usable"][light.state], *said]
-    said += verdict.consequences(causes[:_MOST], only_actions=True)
-    groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
+    said += _look_at(record, light)
+    said += verdict.consequences(causes[:_MOST], first, only_actions=True)
+    groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], first) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    large = [one for one, value in measured_of(record) if one.words(value) == "large"]
-    if light.state == "inconclusive" and not large:
+    if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
-    said += [text for one in large[:1] if (text := _where_large(record, one))]
-    if len(said) == 1 and len(rows := record.excitation.query("quantity == 'next'")):
+    if light.state == "fine":
+        said.insert(0, TEXTS["usable"]["fine"])
+    if said in ([], [TEXTS["usable"]["fine"]]) and len(
+        rows := record.excitation.query("quantity == 'next'")
+    ):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
-    return said[: _MOST + 1]
+    return said[:_MOST_TO_DO]
 
 
-def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
-    """Where to look for what makes an error large; empty where no recording has it."""
-    if yardstick.name == MARKERS:
-        return str(TEXTS["to_do"]["markers"])
-    fits = {t.label: t.fit for t in record.moving_trials() if t.fit is not None}
-    sizes = {label: errors_of([fit], record.use())[yardstick.name] for label, fit in fits.items()}
-    known = {label: size for label, size in sizes.items() if np.isfinite(size)}
-    if not known:
-        return ""
-    worst = max(known, key=known.__getitem__)
-    return str(TEXTS["to_do"]["forces"]).format(trial=worst, error=yardstick.in_sentence())
+def _look_at(record: ParticipantRecord, light: blocks.Light) -> Iterator[str]:
+    """Where to look for what makes the largest error; of the first finding, where it is one."""
+    for one, _ in beyond(record)[:1]:
+        text = TEXTS["to_do"]["markers" if one.name == MARKERS else "forces"]
+        if one.name == MARKERS or (where := worst_of(record, one)):
+            said = text.format(trial=where, error=one.in_sentence())
+            is_finding = large_finding(record) or any(map(is_large, record.causes))
+            yield f"Finding 1: {said}" if is_finding else said

@@ -1,0 +1,213 @@
+"""How large the errors of a person's recordings are with the parameters to use; which recordings may
+still be used, and for what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.report import verdict
+from bsip_cli.report.blocks import Light
+from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
+from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.errors import (
+    COP_LIMIT_M,
+    FORCE_LIMIT_PERCENT,
+    MARKERS,
+    Yardstick,
+    errors_of,
+    yardsticks,
+)
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.words import METHODS, TEXTS, count, listing, number, task_of
+
+_IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
+_OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
+_MOST_REASONS = 4  # in a line
+_MOST_RUNS = 4  # of a task, in a line
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yardstick, float], ...]:
+    """The three yardsticks with this person's numbers, by a method, or by the one to use."""
+    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
+    values = errors_of(fits, method or record.use())
+    values[MARKERS] = 1e3 * float(record.facts["marker_rms_m"])
+    return tuple((one, values[one.name]) for one in _yardsticks(record))
+
+
+def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
+    """The yardsticks beyond which the errors of all recordings together are."""
+    return _large(measured_of(record))
+
+
+def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> str:
+    """The recording in motion where an error is largest; empty where none has it."""
+    sizes = {
+        names_of(record)[trial.stem]: size
+        for trial in record.moving_trials()
+        for one, size in _own(record, trial)
+        if one == yardstick and np.isfinite(size)
+    }
+    return max(sizes, key=sizes.__getitem__, default="")
+
+
+def names_of(record: ParticipantRecord) -> dict[str, str]:
+    """Stem of each recording: its task, with session and run where it is not the only one."""
+    tasks = [task_of(trial.stem) for trial in record.trials]
+    return {
+        trial.stem: task if tasks.count(task) == 1 else trial.label
+        for trial, task in zip(record.trials, tasks, strict=True)
+    }
+
+
+def _yardsticks(record: ParticipantRecord) -> tuple[Yardstick, ...]:
+    """With the limits that the diagnosis was run with."""
+    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
+    return yardsticks(*limits)
+
+
+def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick, float], ...]:
+    """The yardsticks with a recording's own numbers, by the method to use."""
+    values = errors_of([] if trial.fit is None else [trial.fit], record.use())
+    markers = np.empty(0) if trial.kinematics is None else trial.kinematics["marker_rms_m"]
+    squares = np.asarray(markers, dtype=float) ** 2
+    squares = squares[np.isfinite(squares)]
+    values[MARKERS] = 1e3 * float(np.sqrt(squares.mean())) if len(squares) else np.nan
+    return tuple((one, values[one.name]) for one in _yardsticks(record))
+
+
+def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
+    return [(one, size) for one, size in sizes if one.words(size) == "large"]
+
+
+# --- the answer, and the finding that it is -------------------------------------------------------
+
+
+def light_for(record: ParticipantRecord) -> Light:
+    """The answer, as `bsip show` prints it too."""
+    large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
+    alone = [
+        names_of(record)[trial.stem]
+        for trial in record.moving_trials()
+        if _large(_own(record, trial))
+    ]
+    tables = record.diagnosis, record.detection, record.budget
+    return verdict.light_of(*tables, large, record.use(), alone)
+
+
+def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
+    """The first finding where errors are large and the diagnosis has none that says so: how large,
+    where most, whether the cause is known; else none."""
+    is_said = any(is_large(cause) for cause in record.causes)
+    if is_said or light_for(record).state != "large":
+        return ()
+    found = beyond(record)
+    sizes = [
+        f"{one.short()} {number(size)} {one.unit} (large from {number(one.limit, 0)})"
+        for one, size in found
+    ]
+    where = worst_of(record, found[0][0])
+    known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    others = "in part at most by the findings below" if record.causes else "by no fault found here"
+    return (
+        f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
+        f"{f', most in {where}' if where else ''}{'' if known else f'; explained {others}'}.",
+    )
+
+
+# --- which recordings may be used ---------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Use:
+    """What a recording may be used for, a key of ``uses`` in the texts; why for no more."""
+
+    kind: str
+    why: str = ""
+
+    def in_words(self) -> str:
+        """For a cell."""
+        return TEXTS["uses"][self.kind]["short"] + (f" ({self.why})" if self.why else "")
+
+
+def use_lines(record: ParticipantRecord) -> Iterator[str]:
+    """A line per kind of use, the best first."""
+    if light_for(record).state == "inconclusive":
+        yield TEXTS["usable"]["inconclusive"]
+        return
+    names, uses = names_of(record), uses_of(record)
+    for kind, words in TEXTS["uses"].items():
+        because: dict[str, list[str]] = {}
+        for stem, use in uses.items():
+            if use.kind == kind:
+                because.setdefault(use.why, []).append(stem)
+        if len(because) > _MOST_REASONS:
+            stems = [stem for of in because.values() for stem in of]
+            because = {"each has its reason below": stems}
+        parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
+        if parts:
+            yield f"{words['long']}: {'; '.join(parts)}."
+
+
+def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
+    """``all recordings``, their names, or how many of each task."""
+    if len(stems) == len(names):
+        return "all recordings"
+    tasks = [task_of(stem) for stem in stems]
+    of_each = {task: [s for s in stems if task_of(s) == task] for task in tasks}
+    return listing(
+        [
+            f"{len(of)} × {task}" if len(of) > _MOST_RUNS else listing([names[s] for s in of])
+            for task, of in of_each.items()
+        ]
+    )
+
+
+def uses_of(record: ParticipantRecord) -> dict[str, Use]:
+    """Of each recording, by its stem, as far as its errors and the findings tell."""
+    first = 1 + len(large_finding(record))
+    return {trial.stem: _use_of(record, trial, first) for trial in record.trials}
+
+
+def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
+    """By the worst of its markers, its forces and the findings that concern it; ``first``: the
+    number of the first finding of the diagnosis."""
+    if trial.kinematics is None or trial.kinematics.empty:
+        return Use("out", "no motion was computed")
+    found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
+    large = {
+        one.name: f"{one.brief} {number(x)} {one.unit}" for one, x in _large(_own(record, trial))
+    }
+    unexplained = _numbered([k for k, cause in found.items() if is_large(cause)])
+    wrong = listing([*large.values()], "") or unexplained
+    moved = [k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION]
+    if wrong and (moved or MARKERS in large):
+        return Use("out", "; ".join(filter(None, (wrong, _numbered(moved)))))
+    if wrong:
+        return Use("motion", wrong)
+    if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
+        return Use("motion", "forces could not be compared")
+    to_correct = [k for k, cause in found.items() if not _families(cause) <= _IN_THE_MODEL]
+    if to_correct:
+        return Use("corrected", _numbered(to_correct))
+    return Use("care", _numbered([*found])) if found else Use("full")
+
+
+def _numbered(findings: Sequence[int]) -> str:
+    words = "finding" if len(findings) == 1 else "findings"
+    return f"{words} {listing([str(k) for k in findings])}" if findings else ""
+
+
+def _concerns(cause: Sequence[Candidate], trial: TrialRecord) -> bool:
+    """What quiet stance shows of a mass or a plate concerns all recordings."""
+    is_of_all = cause[0].class_id == OF_THE_WEIGHT
+    return is_of_all or any(trial.stem in one.trials for one in cause)
+
+
+def _families(cause: Sequence[Candidate]) -> set[str]:
+    return {EFFECT_WORDS[one.effect].family for one in cause}

@@ -93,17 +93,16 @@ class Candidate:
         """The laboratory's, as all its persons together show it."""
         return bool(_OF_ALL.search(self.sentence))
 
-    def which_size(self) -> str:
+    def which_size(self, short: bool = False) -> str:
         """Of a fault of the laboratory, why its size is the one to correct with, and this person's
-        own; empty of all others."""
+        own; empty of all others. ``short``: without the interval of that."""
         found = _OF_ALL.search(self.sentence)
         if not found:
             return ""
-        own = f"; this person alone: {true_minus(found['own'])}" if found["own"] else ""
-        return (
-            f"Correct with this size: it is the laboratory's, the same for all its "
-            f"{found['persons']} persons{own}."
-        )
+        own = (found["own"] or "").partition(", ")[0] if short else found["own"]
+        alone = f" (this person alone: {true_minus(own)})" if own else ""
+        persons = found["persons"]
+        return f"Correct with this size, as {persons} persons of the laboratory share it{alone}."
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""

@@ -151,7 +151,8 @@ def _compared(first: pd.Series, together: bool) -> str:
     where = f"{where}all together " if together and n > 1 else where
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
-    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    table, times = "RM (table)", "RM+mass (RM, scaled)"
+    table = RM if first["use"] == RM else table
     said = f"{om} than {table} and {times}"
     if om != over_scaled:
         said = f"{om} than {table}, {over_scaled} than {times}"
@@ -179,7 +180,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
+SOURCES = "Good: Hansen 2017, table 4; large: Hicks 2015; markers: OpenSim."
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
@@ -205,6 +206,10 @@ class Yardstick:
         """Before its size."""
         return self.in_sentence().removesuffix(" error")
 
+    def brief_unit(self) -> str:
+        """Without of what."""
+        return self.unit.partition(" ")[0]
+
     def words(self, value: float) -> str:
         if not np.isfinite(value):
             return "not known"
@@ -223,10 +228,10 @@ class Yardstick:
             min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
-            f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
+            f"good to {self.good:.2g}",
+            f"large from {number(self.limit, 0)}",
             bool(value > end),
-            "" if self.name == MARKERS else other,
+            other,
         )
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bsip_cli.report import blocks, verdict
-from bsip_cli.report.candidates import OF_THE_WEIGHT, analysed, effects_in, is_large
-from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.errors import ENDS_AT, MARKERS, SOURCES, overall_pieces, use_sentence
+from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in, is_large
+from bsip_cli.report.effect_words import effect_title, separating_recording
+from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentence
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
@@ -22,17 +22,17 @@ from bsip_cli.report.recordings import (
     worst_of,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
+from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, listing, number
 from bsip_cli.statistics.methods import RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 2  # findings of the diagnosis
+_MOST = 2  # findings in full
+_MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
 _POSES = 8  # among which the one is chosen that is shown
-_SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
@@ -44,7 +44,6 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if has_findings and light.state == "large" else light,
-        blocks.Paragraph(_SIGNS, "note"),
         *_causes(record),
         *_sizes(record),
         *_sure(record, light),
@@ -62,7 +61,8 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     """Names and what is known: the person, the recordings, the software."""
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
-    person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
+    sex = f"{_SEXES[facts['sex']]}, " if facts["sex"] in _SEXES else ""
+    person = f"{sex}{number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and number(plates, 1) != number(mass, 1):
         person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
@@ -115,20 +115,40 @@ def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    peaks = all_peaks(record.trials)
-    lines = [*large_finding(record)]
-    lines += [
+    peaks, large = all_peaks(record.trials), large_finding(record)
+    shown = _causes_shown(record)
+    lines = [
         verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
-        for cause in record.causes[:_MOST]
+        for cause in shown
     ]
-    if lines:
-        yield blocks.Numbered(tuple(lines))
-    if more := record.causes[_MOST:]:
-        words = [" or ".join(verdict.titles(cause)) for cause in more]
-        times = {one: words.count(one) for one in words}
-        named = [one if n == 1 else f"{n} × {one}" for one, n in times.items()]
-        address = ((f"{count(len(more), 'more finding')} below", f"#{verdict.ALL_FAULTS}"),)
-        yield blocks.Links("", address, f": {'; '.join(named)}.")
+    if large or lines:
+        yield blocks.Numbered((*large, *lines))
+    if more := record.causes[len(shown) :]:
+        address = (("More findings below", f"#{verdict.ALL_FAULTS}"),)
+        first = 1 + len(large) + len(shown)
+        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first))}.")
+
+
+def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str]:
+    """``3 and 5: marker not in its place``; findings of which one may be the other count together."""
+    groups: list[tuple[list[int], list[str]]] = []
+    for k, cause in enumerate(causes, first):
+        titles = [effect_title(one.effect) for one in cause]
+        mine = [group for group in groups if {*group[1]} & {*titles}]
+        merged = [k, *(n for numbers, _ in mine for n in numbers)]
+        titles += [title for _, others in mine for title in others]
+        groups = [group for group in groups if group not in mine]
+        groups.append((sorted(merged), titles))
+    groups.sort()
+    for numbers, titles in groups[:_MOST_KINDS]:
+        yield f"{listing([str(k) for k in numbers])}: {' / '.join(dict.fromkeys(titles))}"
+    if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
+        yield f"{rest} more"
+
+
+def _causes_shown(record: ParticipantRecord) -> tuple[Sequence[Candidate], ...]:
+    """Those of which the page says all."""
+    return record.causes[: _MOST - len(large_finding(record))]
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -136,13 +156,15 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     made."""
     if record.diagnosis is None or record.detection is None:
         return
+    unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        unknown = ", its cause is not known" if verdict.CAUSE_UNKNOWN in light.title else ""
-        said.append(f"That the error is large is certain{unknown}.")
-    if not record.causes and light.state != "large":
+        known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+        said.append(f"The large error is certain{'' if known else ', its cause unknown'}.")
+        unseen = unseen if known else verdict.MAY_HIDE
+    elif not record.causes:
         said.append("No fault is more probable than not.")
-    said.append(verdict.unseen(record.detection, record.diagnosis))
+    said.append(unseen)
     if text := " ".join(filter(None, said)):
         yield blocks.Heading("How sure is this?")
         yield blocks.Paragraph(text)
@@ -152,23 +174,17 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """The yardsticks, what makes the error, and of which parameters each of both is."""
-    use = record.use()
-    bar = tuple(budget_bar(record))
-    is_other = bool(bar) and use != RM
-    table = {one.name: size for one, size in measured_of(record, RM)}
-    scales = [
-        one.scale(size, f"with {RM} {number(table[one.name])}" if is_other else "")
-        for one, size in measured_of(record)
-    ]
-    shown = TEXTS["shown"]["each" if is_other else "both" if bar else "scales"]
-    yield blocks.Heading(f"How large are the errors{', and what makes them' if bar else ''}?")
-    yield blocks.Paragraph(shown.format(use=METHODS[use], table=METHODS[RM]))
+    """The yardsticks, and what makes the error: each says of which parameters it is."""
+    use, bar = record.use(), tuple(budget_bar(record))
+    table = {one.name: number(size) for one, size in measured_of(record, RM)} if bar else {}
+    scales = []
+    for one, size in measured_of(record):
+        other = table.get(one.name, number(size))
+        scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
+    yield blocks.Heading(f"How large are the errors with {METHODS[use]}?")
     yield blocks.Scales(tuple(scales))
     yield from bar
-    yield blocks.Paragraph(
-        f"Root mean squares (RMS). Scales end at {ENDS_AT:g} × large. {SOURCES}", "note"
-    )
+    yield blocks.Paragraph(SOURCES, "note")
 
 
 def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
@@ -176,7 +192,9 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
-        yield blocks.Bar(f"What makes the squared error with {METHODS[RM]}", pieces)
+        use = record.use()
+        other = f" of {METHODS[RM]}, not {use}" if use != RM else ""
+        yield blocks.Bar(f"What makes the squared error{other}", pieces)
 
 
 # --- what to do ---------------------------------------------------------------------------------
@@ -184,11 +202,11 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
 
 def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """At most three things."""
-    causes, first = record.causes, 1 + len(large_finding(record))
+    causes, first = _causes_shown(record), 1 + len(large_finding(record))
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record, light)
-    said += verdict.consequences(causes[:_MOST], first, only_actions=True)
-    groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], first) if len(cause) > 1]
+    said += verdict.consequences(causes, first, only_actions=True)
+    groups = [(k, cause) for k, cause in enumerate(causes, first) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]
         on_scale = cause[0].class_id == OF_THE_WEIGHT
@@ -211,6 +229,6 @@ def _look_at(record: ParticipantRecord, light: blocks.Light) -> Iterator[str]:
     for one, _ in beyond(record)[:1]:
         text = TEXTS["to_do"]["markers" if one.name == MARKERS else "forces"]
         if one.name == MARKERS or (where := worst_of(record, one)):
-            said = text.format(trial=where, error=one.in_sentence())
+            said = text.format(trial=where)
             is_finding = large_finding(record) or any(map(is_large, record.causes))
             yield f"Finding 1: {said}" if is_finding else said

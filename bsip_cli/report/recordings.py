@@ -21,7 +21,7 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, count, listing, number, task_of
+from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
 _OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
@@ -107,16 +107,13 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     if is_said or light_for(record).state != "large":
         return ()
     found = beyond(record)
-    sizes = [
-        f"{one.short()} {number(size)} {one.unit} (large from {number(one.limit, 0)})"
-        for one, size in found
-    ]
+    sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
     where = worst_of(record, found[0][0])
     known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-    others = "in part at most by the findings below" if record.causes else "by no fault found here"
+    others = "other findings explain part at most" if record.causes else "cause unknown"
     return (
         f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
-        f"{f', most in {where}' if where else ''}{'' if known else f'; explained {others}'}.",
+        f"{f', most in {where}' if where else ''}{'' if known else f'; {others}'}.",
     )
 
 
@@ -125,10 +122,12 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Use:
-    """What a recording may be used for, a key of ``uses`` in the texts; why for no more."""
+    """What a recording may be used for, a key of ``uses`` in the texts; why for no more, and the
+    reason that says most."""
 
     kind: str
     why: str = ""
+    most: str = ""
 
     def in_words(self) -> str:
         """For a cell."""
@@ -145,11 +144,11 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
         because: dict[str, list[str]] = {}
         for stem, use in uses.items():
             if use.kind == kind:
-                because.setdefault(use.why, []).append(stem)
+                because.setdefault(use.most, []).append(stem)
         if len(because) > _MOST_REASONS:
             stems = [stem for of in because.values() for stem in of]
-            because = {"each has its reason below": stems}
-        parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
+            because = {"each for the reason below": stems}
+        parts = [", ".join(filter(None, (_listed(of, names), why))) for why, of in because.items()]
         if parts:
             yield f"{words['long']}: {'; '.join(parts)}."
 
@@ -180,22 +179,26 @@ def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
     if trial.kinematics is None or trial.kinematics.empty:
         return Use("out", "no motion was computed")
     found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
-    large = {
-        one.name: f"{one.brief} {number(x)} {one.unit}" for one, x in _large(_own(record, trial))
-    }
-    unexplained = _numbered([k for k, cause in found.items() if is_large(cause)])
-    wrong = listing([*large.values()], "") or unexplained
-    moved = [k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION]
-    if wrong and (moved or MARKERS in large):
-        return Use("out", "; ".join(filter(None, (wrong, _numbered(moved)))))
-    if wrong:
-        return Use("motion", wrong)
+    large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
+    sizes = [f"{one.brief} {number(size)} {one.brief_unit()}" for one, size in large]
+    if unexplained := [k for k, cause in found.items() if is_large(cause)]:
+        sizes = sizes or [_numbered(unexplained)]
+    moved = _numbered([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
+    markers = [size for size, (one, _) in zip(sizes, large, strict=False) if one.name == MARKERS]
+    if markers:
+        return Use("out", listing(sizes), markers[0])
+    if sizes and moved:
+        return Use(
+            "motion", f"{listing(sizes)}; once {moved} is corrected", f"once {moved} is corrected"
+        )
+    if sizes:
+        return Use("motion", listing(sizes), sizes[0])
     if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
-        return Use("motion", "forces could not be compared")
-    to_correct = [k for k, cause in found.items() if not _families(cause) <= _IN_THE_MODEL]
-    if to_correct:
-        return Use("corrected", _numbered(to_correct))
-    return Use("care", _numbered([*found])) if found else Use("full")
+        return Use("motion", *2 * ("forces could not be compared",))
+    correct = _numbered([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
+    if correct:
+        return Use("corrected", correct, correct)
+    return Use("care", *2 * (_numbered([*found]),)) if found else Use("full")
 
 
 def _numbered(findings: Sequence[int]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from string import ascii_lowercase
@@ -52,13 +53,14 @@ ALL_FAULTS = "wrong"  # address of the section that has all of them
 _NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
-_MOST_MEMBERS = 2  # of a group, in a line
+_MOST_MEMBERS = 2  # of a group, in a line with their sizes
 _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
 _UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
+MAY_HIDE = "Faults of any size may hide behind so large an error."
 _OR_THE_MASS = ", or the stated mass is wrong"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
@@ -114,7 +116,7 @@ def verdict_of(
 def unseen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> str:
     """What might have been missed; empty where that is not known."""
     if any(is_large(cause) for cause in causes_of(candidates_of(diagnosis))):
-        return "Faults of any size may hide behind so large an error."
+        return MAY_HIDE
     return limits_sentence(limits_of(detection, diagnosis))
 
 
@@ -208,7 +210,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
     said = [one.against_usual(), f"; {at_joints}" if at_joints else ""]
     said += [f"; probability {sure}" if sure else ""]
     line = f"{capital(one.in_words(remarks=False))}, {where}{''.join(said)}."
-    return f"{line} {one.which_size()}".rstrip()
+    return f"{line} {one.which_size(short=True)}".rstrip()
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -223,24 +225,14 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
     members = [
         "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]
-        for one, text in ranked[:_MOST_MEMBERS]
+        for one, text in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
     ]
-    others = titles([one for one, _ in ranked[_MOST_MEMBERS:]])
+    places = Counter(effect_title(one.effect) for one, _ in ranked[len(members) :])
+    others = [f"{title} ({n} places)" if n > 1 else title for title, n in places.items()]
     head = f"{capital(common)}: one" if common else "One"
     return (
         f"{head} of {len(cause)} causes that look alike here: {'; '.join((*members, *others))}. "
-        f"Probability that it is one of them: {sure}."
-    )
-
-
-def titles(candidates: Sequence[Candidate]) -> tuple[str, ...]:
-    """Each effect by its title, with its place, or the number of its places."""
-    of: dict[str, list[Candidate]] = {}
-    for one in candidates:
-        of.setdefault(one.effect, []).append(one)
-    return tuple(
-        same[0].label if len(same) == 1 else f"{effect_title(effect)} ({len(same)} places)"
-        for effect, same in of.items()
+        f"Together {sure}."
     )
 
 

@@ -115,7 +115,7 @@ def use_sentence(
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
     the artifacts of these names."""
-    use = "Once the large error is gone, use" if is_wrong else "Use"
+    use = "Once that is solved, use" if is_wrong else "Use"
     if choice is None or choice.empty:
         return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
@@ -180,7 +180,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Good: Hansen 2017, table 4; large: Hicks 2015; markers: OpenSim."
+SOURCES = "Good: Hansen 2017; large: Hicks 2015; markers: OpenSim."
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,

@@ -193,7 +193,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
         use = record.use()
-        other = f" of {METHODS[RM]}, not {use}" if use != RM else ""
+        other = f" of {METHODS[RM]}, not {use}" if use != RM else ", by cause"
         yield blocks.Bar(f"What makes the squared error{other}", pieces)
 
 

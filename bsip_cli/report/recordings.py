@@ -122,12 +122,12 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Use:
-    """What a recording may be used for, a key of ``uses`` in the texts; why for no more, and the
-    reason that says most."""
+    """What a recording may be used for, a key of ``uses`` in the texts, and why for no more;
+    ``brief``: the same where many stand in a line."""
 
     kind: str
     why: str = ""
-    most: str = ""
+    brief: str = ""
 
     def in_words(self) -> str:
         """For a cell."""
@@ -144,7 +144,7 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
         because: dict[str, list[str]] = {}
         for stem, use in uses.items():
             if use.kind == kind:
-                because.setdefault(use.most, []).append(stem)
+                because.setdefault(use.brief or use.why, []).append(stem)
         if len(because) > _MOST_REASONS:
             stems = [stem for of in because.values() for stem in of]
             because = {"each for the reason below": stems}
@@ -188,17 +188,15 @@ def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
     if markers:
         return Use("out", listing(sizes), markers[0])
     if sizes and moved:
-        return Use(
-            "motion", f"{listing(sizes)}; once {moved} is corrected", f"once {moved} is corrected"
-        )
+        return Use("motion", f"{listing(sizes)}; after {moved}", f"after {moved}")
     if sizes:
         return Use("motion", listing(sizes), sizes[0])
     if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
-        return Use("motion", *2 * ("forces could not be compared",))
+        return Use("motion", "forces could not be compared")
     correct = _numbered([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
     if correct:
-        return Use("corrected", correct, correct)
-    return Use("care", *2 * (_numbered([*found]),)) if found else Use("full")
+        return Use("corrected", correct)
+    return Use("care" if found else "full", _numbered([*found]))
 
 
 def _numbered(findings: Sequence[int]) -> str:

@@ -295,14 +295,14 @@ def moment_change(
     if len(cause) > 1 or any(c != one and {*c.trials} & {*one.trials} for c in alike):
         return ""
     known = _changed(peaks, (*_LEGS, *_ARMS))
-    is_of_it = known["method"].str.rpartition("+")[2].eq(one.effect)
+    is_of_it = known["method"].str.endswith(f"+{one.effect}")
     rows = known[is_of_it & known["trial"].isin(one.trials)]
     if rows.empty:
         return ""
     most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
     percent = most["change_percent"]
     if rows["change_percent"].max() < 1.0:
-        return "changes no joint moment by 1 % of its peak"
+        return "changes no joint moment by 1 %"
     return (
         f"changes the {in_words(most['joint'])}'s moment by "
         f"{number(percent, 0 if percent >= 1.0 else 1)} % of its peak"
@@ -312,9 +312,7 @@ def moment_change(
 def _changed(peaks: pd.DataFrame, kinds: Sequence[str]) -> pd.DataFrame:
     """Rows of known changes at joints of these kinds."""
     if peaks.empty:
-        return pd.DataFrame(
-            columns=["method", "trial", "change_Nm", "change_percent"], dtype=object
-        )
+        return pd.DataFrame(columns=["method", "trial"], dtype=str)
     asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
     return peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
 

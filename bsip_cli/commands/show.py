@@ -114,7 +114,7 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
         return searched(folder.name, diagnosis, facts), "\n".join(lines)
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
-    light, large = _of_the_page(folder)
+    light, large, _ = _of_the_page(folder)
     found = verdict_of(diagnosis, detection, gains, changes, budget, large)
     right = corrected_sentence(_of_trials(folder, "marker-events"))
     if light:
@@ -130,7 +130,7 @@ def _findings(
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
     error, which parameters to use. Of one among many the first."""
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
-    light, large = _of_the_page(folder)
+    light, large, waits = _of_the_page(folder)
     light = light or light_of(diagnosis, detection, budget)
     use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
     yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}")
@@ -151,17 +151,17 @@ def _findings(
     if choice is not None:
         identified = _table(folder, "identification")
         assert identified is not None  # it was chosen among what was identified
-        yield _wrapped(use_sentence(choice, identified, light.state == "large"), "  - ")
+        yield _wrapped(use_sentence(choice, identified, waits), "  - ")
 
 
-def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...]]:
-    """The answer on the report's first page, and its finding of a large error if any; nothing where
-    there is no report of this diagnosis."""
+def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], bool]:
+    """The answer on the report's first page, its finding of a large error if any, and whether that
+    has to be solved first; nothing where there is no report of this diagnosis."""
     page = _path(folder, "report-files")
     if not page.exists() or not is_made_from(page, _path(folder, "overall-diagnosis")):
-        return None, ()
+        return None, (), False
     facts = read_header(page, "report-files")["provenance"]["facts"]
-    return Light(**facts["light"]), tuple(facts.get("large", ()))
+    return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("waits", False)
 
 
 def _peaks(folder: Path) -> pd.DataFrame:

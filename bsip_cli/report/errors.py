@@ -111,11 +111,11 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
 
 
 def use_sentence(
-    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+    choice: pd.DataFrame | None, identification: pd.DataFrame, waits: bool = False
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names."""
-    use = "Once that is solved, use" if is_wrong else "Use"
+    the artifacts of these names. ``waits``: something else is to be done first."""
+    use = "Once that is solved, use" if waits else "Use"
     if choice is None or choice.empty:
         return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]

@@ -18,6 +18,8 @@ from bsip_cli.report.recordings import (
     large_finding,
     light_for,
     measured_of,
+    must_wait,
+    names_of,
     use_lines,
     worst_of,
 )
@@ -50,7 +52,7 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
         blocks.Heading("What may be used?"),
         blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
-            use_sentence(record.choice, record.identification, light.state == "large")
+            use_sentence(record.choice, record.identification, waits=must_wait(record))
         ),
         blocks.Heading("What to do next"),
         blocks.Bullets(tuple(to_do(record, light))),
@@ -124,7 +126,7 @@ def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if large or lines:
         yield blocks.Numbered((*large, *lines))
     if more := record.causes[len(shown) :]:
-        address = (("More findings below", f"#{verdict.ALL_FAULTS}"),)
+        address = (("More below", f"#{verdict.ALL_FAULTS}"),)
         first = 1 + len(large) + len(shown)
         yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first))}.")
 
@@ -141,7 +143,10 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:_MOST_KINDS]:
-        yield f"{listing([str(k) for k in numbers])}: {' / '.join(dict.fromkeys(titles))}"
+        which = listing([str(k) for k in numbers])
+        if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+            which = f"{numbers[0]} to {numbers[-1]}"
+        yield f"{which}: {' / '.join(dict.fromkeys(titles))}"
     if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
         yield f"{rest} more"
 
@@ -228,7 +233,8 @@ def _look_at(record: ParticipantRecord, light: blocks.Light) -> Iterator[str]:
     """Where to look for what makes the largest error; of the first finding, where it is one."""
     for one, _ in beyond(record)[:1]:
         text = TEXTS["to_do"]["markers" if one.name == MARKERS else "forces"]
-        if one.name == MARKERS or (where := worst_of(record, one)):
-            said = text.format(trial=where)
+        worst = worst_of(record, one)
+        if one.name == MARKERS or worst is not None:
+            said = text.format(trial="" if worst is None else names_of(record)[worst.stem])
             is_finding = large_finding(record) or any(map(is_large, record.causes))
             yield f"Finding 1: {said}" if is_finding else said

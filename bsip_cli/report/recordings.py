@@ -3,6 +3,7 @@ still be used, and for what."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -45,22 +46,23 @@ def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
     return _large(measured_of(record))
 
 
-def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> str:
-    """The recording in motion where an error is largest; empty where none has it."""
+def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | None:
+    """The recording in motion where an error is largest; None where none has it."""
     sizes = {
-        names_of(record)[trial.stem]: size
+        trial.stem: size
         for trial in record.moving_trials()
         for one, size in _own(record, trial)
         if one == yardstick and np.isfinite(size)
     }
-    return max(sizes, key=sizes.__getitem__, default="")
+    worst = max(sizes, key=sizes.__getitem__, default="")
+    return next((trial for trial in record.trials if trial.stem == worst), None)
 
 
 def names_of(record: ParticipantRecord) -> dict[str, str]:
-    """Stem of each recording: its task, with session and run where it is not the only one."""
+    """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
     tasks = [task_of(trial.stem) for trial in record.trials]
     return {
-        trial.stem: task if tasks.count(task) == 1 else trial.label
+        trial.stem: task if tasks.count(task) == 1 else re.sub(r"[()]", "", trial.label)
         for trial, task in zip(record.trials, tasks, strict=True)
     }
 
@@ -108,13 +110,14 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
         return ()
     found = beyond(record)
     sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
-    where = worst_of(record, found[0][0])
-    known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-    others = "other findings explain part at most" if record.causes else "cause unknown"
-    return (
-        f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
-        f"{f', most in {where}' if where else ''}{'' if known else f'; {others}'}.",
-    )
+    said = f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
+    worst = worst_of(record, found[0][0])
+    if worst is not None:
+        said += f", most in {names_of(record)[worst.stem]}"
+    if not verdict.main_part(record.budget, effects_in(record.causes), record.use()):
+        others = worst is not None and any(_concerns(cause, worst) for cause in record.causes)
+        said += "; other findings explain part at most" if others else "; cause unknown"
+    return (f"{said}.",)
 
 
 # --- which recordings may be used ---------------------------------------------------------------
@@ -148,7 +151,7 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
         if len(because) > _MOST_REASONS:
             stems = [stem for of in because.values() for stem in of]
             because = {"each for the reason below": stems}
-        parts = [", ".join(filter(None, (_listed(of, names), why))) for why, of in because.items()]
+        parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
         if parts:
             yield f"{words['long']}: {'; '.join(parts)}."
 
@@ -165,6 +168,12 @@ def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
             for task, of in of_each.items()
         ]
     )
+
+
+def must_wait(record: ParticipantRecord) -> bool:
+    """Whether errors are large, and no recording may be used before they are not."""
+    uses = uses_of(record).values()
+    return light_for(record).state == "large" and not any(x.kind in ("full", "care") for x in uses)
 
 
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:

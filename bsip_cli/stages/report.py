@@ -10,7 +10,7 @@ import pandas as pd
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
 from bsip_cli.report.blocks import FILES, Document, Grid, Picture, render
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.recordings import large_finding, light_for
+from bsip_cli.report.recordings import large_finding, light_for, must_wait
 from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord, with_all_causes
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.running.unit import Unit
@@ -36,7 +36,7 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {"light": asdict(light), "large": large_finding(record)}
+    facts = {"light": asdict(light), "large": large_finding(record), "waits": must_wait(record)}
     unit.write("report-files", rows, facts=facts)
 
 

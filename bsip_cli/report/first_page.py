@@ -20,6 +20,7 @@ from bsip_cli.report.recordings import (
     measured_of,
     must_wait,
     names_of,
+    number_of_main_part,
     use_lines,
     worst_of,
 )
@@ -209,7 +210,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """At most three things."""
     causes, first = _causes_shown(record), 1 + len(large_finding(record))
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
-    said += _look_at(record, light)
+    said += _look_at(record)
     said += verdict.consequences(causes, first, only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes, first) if len(cause) > 1]
     for k, cause in groups[:1]:
@@ -221,20 +222,24 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine":
         said.insert(0, TEXTS["usable"]["fine"])
-    if said in ([], [TEXTS["usable"]["fine"]]) and len(
-        rows := record.excitation.query("quantity == 'next'")
-    ):
+    rows = record.excitation.query("quantity == 'next'")
+    if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
     return said[:_MOST_TO_DO]
 
 
-def _look_at(record: ParticipantRecord, light: blocks.Light) -> Iterator[str]:
-    """Where to look for what makes the largest error; of the first finding, where it is one."""
+def _look_at(record: ParticipantRecord) -> Iterator[str]:
+    """Where to look for what makes the largest error, which is the first finding; nothing where
+    another finding makes the largest part."""
+    if number_of_main_part(record):
+        return
+    is_finding = bool(large_finding(record)) or any(map(is_large, record.causes))
+    number_of_it = "Finding 1: " if is_finding else ""
     for one, _ in beyond(record)[:1]:
-        text = TEXTS["to_do"]["markers" if one.name == MARKERS else "forces"]
         worst = worst_of(record, one)
-        if one.name == MARKERS or worst is not None:
-            said = text.format(trial="" if worst is None else names_of(record)[worst.stem])
-            is_finding = large_finding(record) or any(map(is_large, record.causes))
-            yield f"Finding 1: {said}" if is_finding else said
+        if one.name == MARKERS:
+            yield f"{number_of_it}{TEXTS['to_do']['markers']}"
+        elif worst is not None:
+            where = names_of(record)[worst.stem]
+            yield f"{number_of_it}{TEXTS['to_do']['forces'].format(trial=where)}"

@@ -12,7 +12,7 @@ import numpy as np
 from bsip_cli.report import verdict
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
-from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
 from bsip_cli.report.errors import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
@@ -114,10 +114,26 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"
-    if not verdict.main_part(record.budget, effects_in(record.causes), record.use()):
+    return (f"{said}; {_why_large(record, worst)}.",)
+
+
+def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
+    """What makes the largest part, as far as the budget of the parameters to use tells."""
+    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    if part is None:
         others = worst is not None and any(_concerns(cause, worst) for cause in record.causes)
-        said += "; other findings explain part at most" if others else "; cause unknown"
-    return (f"{said}.",)
+        return "other findings explain part at most" if others else "cause unknown"
+    number_of = number_of_main_part(record)
+    return f"the largest part is {f'finding {number_of}' if number_of else part.label}"
+
+
+def number_of_main_part(record: ParticipantRecord) -> int:
+    """Of the finding that makes the largest part of a large error; 0 if none does."""
+    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    titles = [] if part is None else part.label.split(" or ")
+    is_said = any(is_large(cause) for cause in record.causes)
+    numbered = enumerate(record.causes, start=1 if is_said else 2)
+    return next((k for k, c in numbered if effect_title(c[0].effect) in titles), 0)
 
 
 # --- which recordings may be used ---------------------------------------------------------------

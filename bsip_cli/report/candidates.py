@@ -106,7 +106,7 @@ class Candidate:
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
-        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence))
+        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", re.sub(_OF_ALL, "", self.sentence)))
         text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return true_minus(text)

@@ -139,7 +139,7 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         titles = [effect_title(one.effect) for one in cause]
         mine = [group for group in groups if {*group[1]} & {*titles}]
         merged = [k, *(n for numbers, _ in mine for n in numbers)]
-        titles += [title for _, others in mine for title in others]
+        titles = [*(title for _, others in mine for title in others), *titles]
         groups = [group for group in groups if group not in mine]
         groups.append((sorted(merged), titles))
     groups.sort()

@@ -121,8 +121,9 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells."""
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
     if part is None:
-        others = worst is not None and any(_concerns(cause, worst) for cause in record.causes)
-        return "other findings explain part at most" if others else "cause unknown"
+        if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
+            return "other findings explain part at most"
+        return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
     number_of = number_of_main_part(record)
     return f"the largest part is {f'finding {number_of}' if number_of else part.label}"
 
@@ -130,10 +131,10 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
 def number_of_main_part(record: ParticipantRecord) -> int:
     """Of the finding that makes the largest part of a large error; 0 if none does."""
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-    titles = [] if part is None else part.label.split(" or ")
+    label = "" if part is None else part.label
     is_said = any(is_large(cause) for cause in record.causes)
     numbered = enumerate(record.causes, start=1 if is_said else 2)
-    return next((k for k, c in numbered if effect_title(c[0].effect) in titles), 0)
+    return next((k for k, c in numbered if effect_title(c[0].effect) in label), 0)
 
 
 # --- which recordings may be used ---------------------------------------------------------------

@@ -61,6 +61,7 @@ _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
 _UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
 MAY_HIDE = "Faults of any size may hide behind so large an error."
+NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
 _OR_THE_MASS = ", or the stated mass is wrong"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
@@ -141,7 +142,7 @@ def light_of(
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
     looked = count(len(analysed(detection, diagnosis)), "recording")
-    nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+    nothing = f"{capital(NONE_FOUND)} in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
         more = "also " if found and any(map(is_large, causes)) else ""

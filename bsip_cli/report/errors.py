@@ -125,8 +125,9 @@ def use_sentence(
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    rest = " for all other movements" if others else ""
-    most = f"{TEXTS['methods_in_full'][str(first['use'])]}{rest}"
+    most = TEXTS["methods_in_full"][str(first["use"])]
+    if others:
+        most = f"{TEXTS['methods'][str(first['use'])]} for all other movements"
     said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
     rare = identification[identification["rare"].astype(bool)]
     warned = [
@@ -148,11 +149,12 @@ def _compared(first: pd.Series, together: bool) -> str:
         "whole_trials": f"in {count(n, 'other recording')} ",
         "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
-    where = f"{where}all together " if together and n > 1 else where
+    if together and where.startswith("in ") and n > 1:
+        where = "in both other recordings " if n == 2 else f"in all {where.removeprefix('in ')}"
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
     table, times = "RM (table)", "RM+mass (RM, scaled)"
-    table = RM if first["use"] == RM else table
+    table = RM if together or first["use"] == RM else table
     said = f"{om} than {table} and {times}"
     if om != over_scaled:
         said = f"{om} than {table}, {over_scaled} than {times}"
@@ -242,9 +244,7 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
     return (
         Yardstick(COP, "Centre of pressure (COP) error", "COP", "mm", *cop),
         Yardstick(FORCE, "Vertical force error", "vertical force", "% of body weight", *force),
-        Yardstick(
-            MARKERS, "Markers from model", "markers", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM
-        ),
+        Yardstick(MARKERS, "Markers from model", "marker", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
     )
 
 

@@ -15,6 +15,7 @@ from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentenc
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
+    large_alone,
     large_finding,
     light_for,
     measured_of,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST = 2  # findings in full
+_FEW = 3  # findings, whose actions are all given
 _MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
 _POSES = 8  # among which the one is chosen that is shown
@@ -209,9 +211,10 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
 def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     """At most three things."""
     causes, first = _causes_shown(record), 1 + len(large_finding(record))
+    few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record)
-    said += verdict.consequences(causes, first, only_actions=True)
+    said += verdict.consequences(few, first, only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes, first) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]
@@ -230,16 +233,18 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
-    """Where to look for what makes the largest error, which is the first finding; nothing where
-    another finding makes the largest part."""
+    """Where to look for what makes the largest error, which is the first finding, or those of single
+    recordings; nothing where another finding makes the largest part."""
     if number_of_main_part(record):
         return
     is_finding = bool(large_finding(record)) or any(map(is_large, record.causes))
     number_of_it = "Finding 1: " if is_finding else ""
+    texts, names = TEXTS["to_do"], names_of(record)
     for one, _ in beyond(record)[:1]:
         worst = worst_of(record, one)
         if one.name == MARKERS:
-            yield f"{number_of_it}{TEXTS['to_do']['markers']}"
+            yield f"{number_of_it}{texts['markers']}"
         elif worst is not None:
-            where = names_of(record)[worst.stem]
-            yield f"{number_of_it}{TEXTS['to_do']['forces'].format(trial=where)}"
+            yield f"{number_of_it}{texts['forces'].format(trial=names[worst.stem])}"
+    if not beyond(record) and (alone := large_alone(record)):
+        yield texts["forces"].format(trial=listing([names[trial.stem] for trial in alone]))

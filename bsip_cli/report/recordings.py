@@ -46,6 +46,11 @@ def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
     return _large(measured_of(record))
 
 
+def large_alone(record: ParticipantRecord) -> list[TrialRecord]:
+    """Recordings in motion with an error beyond the yardsticks of their own."""
+    return [trial for trial in record.moving_trials() if _large(_own(record, trial))]
+
+
 def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | None:
     """The recording in motion where an error is largest; None where none has it."""
     sizes = {
@@ -93,11 +98,7 @@ def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, fl
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
     large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
-    alone = [
-        names_of(record)[trial.stem]
-        for trial in record.moving_trials()
-        if _large(_own(record, trial))
-    ]
+    alone = [names_of(record)[trial.stem] for trial in large_alone(record)]
     tables = record.diagnosis, record.detection, record.budget
     return verdict.light_of(*tables, large, record.use(), alone)
 
@@ -206,7 +207,7 @@ def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
         return Use("out", "no motion was computed")
     found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
     large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
-    sizes = [f"{one.brief} {number(size)} {one.brief_unit()}" for one, size in large]
+    sizes = [f"{one.brief} error {number(size)} {one.brief_unit()}" for one, size in large]
     if unexplained := [k for k, cause in found.items() if is_large(cause)]:
         sizes = sizes or [_numbered(unexplained)]
     moved = _numbered([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])

@@ -156,7 +156,7 @@ def light_of(
         return Light("fine", title, nothing)
     share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
+    named = "" if np.isnan(share) else f"What was found makes {size} of RM's squared error."
     title = capital(found) if large is None else f"{capital(found)}; {no_large}"
     return Light("cause", title, named or f"Searched: {looked}.")
 

@@ -103,12 +103,12 @@ def test_a_recording_with_a_fault_waits_for_what_can_be_done(record, effect, kin
 def test_forces_far_off_leave_the_motion_and_markers_far_off_nothing(record):
     far = with_error(with_faults(record), BASKETBALL, rmse_percent_bw=7.25)
     assert kinds_of(far) == ["full", "full", "motion"]
-    assert "Use only the motion: basketball (vertical force 7.2 %)." in list(use_lines(far))
+    assert "Use only the motion: basketball (vertical force error 7.2 %)." in list(use_lines(far))
     slipped = with_faults(far, fault("marker_shift", BASKETBALL))
     assert "Use only the motion: basketball (after finding 2)." in list(use_lines(slipped))
     moved = far.trials[2].kinematics.assign(marker_rms_m=0.0235)
     lost = with_trial(far, BASKETBALL, kinematics=moved)
-    assert "Leave out: basketball (markers 23.5 mm)." in list(use_lines(lost))
+    assert "Leave out: basketball (marker error 23.5 mm)." in list(use_lines(lost))
     gone = with_trial(far, BASKETBALL, kinematics=None)
     assert "Leave out: basketball (no motion was computed)." in list(use_lines(gone))
 

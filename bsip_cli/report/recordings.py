@@ -23,6 +23,7 @@ from bsip_cli.report.errors import (
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of
+from bsip_cli.statistics.methods import OM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
 _OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
@@ -178,20 +179,20 @@ def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
     """``all recordings``, their names, or how many of each task."""
     if len(stems) == len(names):
         return "all recordings"
-    tasks = [task_of(stem) for stem in stems]
-    of_each = {task: [s for s in stems if task_of(s) == task] for task in tasks}
-    return listing(
-        [
-            f"{len(of)} × {task}" if len(of) > _MOST_RUNS else listing([names[s] for s in of])
-            for task, of in of_each.items()
-        ]
-    )
+    items: list[str] = []
+    for task in dict.fromkeys(map(task_of, stems)):
+        of = [names[stem] for stem in stems if task_of(stem) == task]
+        items += [f"{len(of)} × {task}"] if len(of) > _MOST_RUNS else of
+    return listing(items)
 
 
 def must_wait(record: ParticipantRecord) -> bool:
-    """Whether errors are large, and no recording may be used before they are not."""
-    uses = uses_of(record).values()
-    return light_for(record).state == "large" and not any(x.kind in ("full", "care") for x in uses)
+    """Whether no parameters should be used yet: errors are large and no recording may be used, or
+    not all of those may that identified the parameters to use."""
+    uses = uses_of(record)
+    usable = {stem for stem, use in uses.items() if use.kind in ("full", "care")}
+    own = {trial.stem for trial in record.identification_trials()} if record.use() == OM else set()
+    return not own <= usable or (light_for(record).state == "large" and not usable)
 
 
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
@@ -207,17 +208,14 @@ def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
         return Use("out", "no motion was computed")
     found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
     large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
-    sizes = [f"{one.brief} error {number(size)} {one.brief_unit()}" for one, size in large]
-    if unexplained := [k for k, cause in found.items() if is_large(cause)]:
-        sizes = sizes or [_numbered(unexplained)]
+    sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
+    if MARKERS in sizes:
+        return Use("out", listing([*sizes.values()]), sizes[MARKERS])
+    unexplained = _numbered([k for k, cause in found.items() if is_large(cause)])
     moved = _numbered([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
-    markers = [size for size, (one, _) in zip(sizes, large, strict=False) if one.name == MARKERS]
-    if markers:
-        return Use("out", listing(sizes), markers[0])
-    if sizes and moved:
-        return Use("motion", f"{listing(sizes)}; after {moved}", f"after {moved}")
-    if sizes:
-        return Use("motion", listing(sizes), sizes[0])
+    if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
+        after = f"after {moved}" if moved else ""
+        return Use("motion", "; ".join(filter(None, (listing(wrong), after))), after or wrong[0])
     if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
         return Use("motion", "forces could not be compared")
     correct = _numbered([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])

@@ -144,7 +144,7 @@ def test_runs_are_counted_where_they_are_many(record):
         "Use once corrected or stated: static (finding 1).",
     ]
     two = replace(many, trials=many.trials[:5])
-    assert "basketball and walking run 1 and walking run 2." in next(iter(use_lines(two)))
+    assert "basketball, walking run 1 and walking run 2." in next(iter(use_lines(two)))
 
 
 # --- a large error is a finding -----------------------------------------------------------------
@@ -153,7 +153,7 @@ def test_runs_are_counted_where_they_are_many(record):
 def test_large_alone_is_in_the_title(record):
     far = with_error(with_faults(record), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(far).title == "Fine: no fault found, no large error but in sequence"
-    assert large_finding(far) == () and not must_wait(far)
+    assert large_finding(far) == ()
     both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(both).title == "1 fault found; no large error but in sequence"
 
@@ -170,9 +170,22 @@ def test_a_large_error_comes_first_and_counts(record):
     *_, to_do = front(far)
     assert to_do.items[0].startswith("Finding 1: In basketball look for")
     assert to_do.items[1].startswith("Finding 2: Correct the forces")
-    assert must_wait(far) is False  # quiet stance may be used
     assert [one.name for one, _ in beyond(far)] == [FORCE]
     assert worst_of(far, beyond(far)[0][0]).stem == BASKETBALL
+
+
+def test_parameters_wait_for_the_recordings_that_they_are_from(record):
+    """And with a large error for any recording that may be used: here quiet stance may."""
+    fine = with_faults(record)
+    assert not must_wait(fine)
+    assert must_wait(with_faults(record, fault("sync_offset", SEQUENCE)))
+    assert not must_wait(with_faults(record, fault("sync_offset", BASKETBALL)))
+    table = replace(fine, choice=record.choice.assign(use="RM"))
+    far = table
+    for stem in TRIALS:
+        far = with_error(far, stem, rmse_percent_bw=9.0)
+    assert light_for(far).state == "large" and not must_wait(far)
+    assert must_wait(with_error(far, STATIC, rmse_percent_bw=9.0))
 
 
 def test_elsewhere_found_is_no_explanation(record):

@@ -191,8 +191,8 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
         scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
     yield blocks.Heading(f"How large are the errors with {METHODS[use]}?")
     yield blocks.Scales(tuple(scales))
-    yield from bar
     yield blocks.Paragraph(SOURCES, "note")
+    yield from bar
 
 
 def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:

@@ -223,8 +223,8 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         said.append(f"To learn the cause of finding {k}, {step}.")
     if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
-    if light.state == "fine":
-        said.insert(0, TEXTS["usable"]["fine"])
+    if light.state == "fine" and not said:
+        said.append(TEXTS["usable"]["fine"])
     rows = record.excitation.query("quantity == 'next'")
     if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]

@@ -14,7 +14,9 @@ from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
 from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
 from bsip_cli.report.errors import (
+    COP,
     COP_LIMIT_M,
+    FORCE,
     FORCE_LIMIT_PERCENT,
     MARKERS,
     Yardstick,
@@ -47,9 +49,11 @@ def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
     return _large(measured_of(record))
 
 
-def large_alone(record: ParticipantRecord) -> list[TrialRecord]:
-    """Recordings in motion with an error beyond the yardsticks of their own."""
-    return [trial for trial in record.moving_trials() if _large(_own(record, trial))]
+def large_alone(record: ParticipantRecord, with_markers: bool = False) -> list[TrialRecord]:
+    """Recordings in motion with an error of the forces, or of the markers too, beyond a yardstick."""
+    asked = (COP, FORCE, MARKERS) if with_markers else (COP, FORCE)
+    found = ((trial, _large(_own(record, trial))) for trial in record.moving_trials())
+    return [trial for trial, large in found if any(one.name in asked for one, _ in large)]
 
 
 def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | None:
@@ -99,7 +103,7 @@ def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, fl
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
     large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
-    alone = [names_of(record)[trial.stem] for trial in large_alone(record)]
+    alone = [names_of(record)[trial.stem] for trial in large_alone(record, with_markers=True)]
     tables = record.diagnosis, record.detection, record.budget
     return verdict.light_of(*tables, large, record.use(), alone)
 
@@ -116,6 +120,8 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"
+    if all(one.name == MARKERS for one, _ in found):
+        return (f"{said}.",)
     return (f"{said}; {_why_large(record, worst)}.",)
 
 
@@ -131,7 +137,9 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
 
 
 def number_of_main_part(record: ParticipantRecord) -> int:
-    """Of the finding that makes the largest part of a large error; 0 if none does."""
+    """Of the finding that makes the largest part of a large error of forces; 0 if none does."""
+    if all(one.name == MARKERS for one, _ in beyond(record)):
+        return 0
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
     label = "" if part is None else part.label
     is_said = any(is_large(cause) for cause in record.causes)

@@ -154,6 +154,8 @@ def test_large_alone_is_in_the_title(record):
     far = with_error(with_faults(record), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(far).title == "Fine: no fault found, no large error but in sequence"
     assert large_finding(far) == ()
+    *_, to_do = front(replace(far, refusals=()))
+    assert len(to_do.items) == 1 and to_do.items[0].startswith("In sequence look for feet or hands")
     both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(both).title == "1 fault found; no large error but in sequence"
 
@@ -204,6 +206,18 @@ def test_a_fault_that_makes_the_largest_part_is_named(record):
     *_, to_do = front(known)
     assert to_do.items[0].startswith("Finding 2: Correct the forces")  # and no search for the cause
     assert number_of_main_part(far) == 0
+
+
+def test_markers_far_off_are_no_matter_of_the_forces(record):
+    facts = record.facts.copy()
+    facts["marker_rms_m"] = 0.025
+    lost = replace(with_faults(record, TURNED), facts=facts)
+    assert large_finding(lost)[0].startswith(
+        "Large error with OM (identified): markers from model 25"
+    )
+    assert "explain" not in large_finding(lost)[0] and number_of_main_part(lost) == 0
+    *_, to_do = front(lost)
+    assert to_do.items[0].startswith("Finding 1: Check that marker set and labels are right")
 
 
 def test_the_terminal_numbers_findings_as_the_page_does(reports, tmp_path):

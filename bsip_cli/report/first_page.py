@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bsip_cli.report import blocks, verdict
-from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in, is_large
+from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
 from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentence
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
+    is_said,
     large_alone,
     large_finding,
     light_for,
@@ -221,6 +222,9 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
+    if not beyond(record) and (alone := large_alone(record)):
+        where = listing([names_of(record)[trial.stem] for trial in alone])
+        said.append(TEXTS["to_do"]["forces"].format(trial=where))
     if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine" and not said:
@@ -233,18 +237,16 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
-    """Where to look for what makes the largest error, which is the first finding, or those of single
-    recordings; nothing where another finding makes the largest part."""
+    """Where to look for what makes the largest error, which is the first finding; nothing where
+    another finding makes the largest part."""
     if number_of_main_part(record):
         return
-    is_finding = bool(large_finding(record)) or any(map(is_large, record.causes))
+    is_finding = bool(large_finding(record)) or is_said(record)
     number_of_it = "Finding 1: " if is_finding else ""
-    texts, names = TEXTS["to_do"], names_of(record)
+    texts = TEXTS["to_do"]
     for one, _ in beyond(record)[:1]:
         worst = worst_of(record, one)
         if one.name == MARKERS:
             yield f"{number_of_it}{texts['markers']}"
         elif worst is not None:
-            yield f"{number_of_it}{texts['forces'].format(trial=names[worst.stem])}"
-    if not beyond(record) and (alone := large_alone(record)):
-        yield texts["forces"].format(trial=listing([names[trial.stem] for trial in alone]))
+            yield f"{number_of_it}{texts['forces'].format(trial=names_of(record)[worst.stem])}"

@@ -111,10 +111,9 @@ def light_for(record: ParticipantRecord) -> Light:
 def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     """The first finding where errors are large and the diagnosis has none that says so: how large,
     where most, whether the cause is known; else none."""
-    is_said = any(is_large(cause) for cause in record.causes)
-    if is_said or light_for(record).state != "large":
-        return ()
     found = beyond(record)
+    if not found or is_said(record) or light_for(record).state != "large":
+        return ()
     sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
     said = f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
     worst = worst_of(record, found[0][0])
@@ -123,6 +122,15 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     if all(one.name == MARKERS for one, _ in found):
         return (f"{said}.",)
     return (f"{said}; {_why_large(record, worst)}.",)
+
+
+def is_said(record: ParticipantRecord) -> bool:
+    """Whether the diagnosis has a finding of a large error where the largest one is."""
+    worst = [worst_of(record, one) for one, _ in beyond(record)[:1]]
+    return any(
+        is_large(cause) and all(one is None or _concerns(cause, one) for one in worst)
+        for cause in record.causes
+    )
 
 
 def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
@@ -142,8 +150,7 @@ def number_of_main_part(record: ParticipantRecord) -> int:
         return 0
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
     label = "" if part is None else part.label
-    is_said = any(is_large(cause) for cause in record.causes)
-    numbered = enumerate(record.causes, start=1 if is_said else 2)
+    numbered = enumerate(record.causes, start=1 if is_said(record) else 2)
     return next((k for k, c in numbered if effect_title(c[0].effect) in label), 0)
 
 

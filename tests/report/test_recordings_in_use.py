@@ -208,6 +208,21 @@ def test_a_fault_that_makes_the_largest_part_is_named(record):
     assert number_of_main_part(far) == 0
 
 
+def test_a_large_error_elsewhere_is_a_finding_of_its_own(record):
+    """The diagnosis speaks of the recording that is not the worst."""
+    error = fault("unexplained", SEQUENCE, target="", parameter="error").assign(
+        sentence="large error, cause unknown: 21 N of the vertical force remain unexplained"
+    )
+    far = with_error(with_faults(record, error), BASKETBALL, rmse_percent_bw=9.0)
+    assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
+    (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
+    assert [line[:5] for line in numbered.items] == ["Large", "21 N "]
+    there = with_faults(far, error.assign(trials=", ".join(TRIALS)))
+    assert large_finding(there) == ()
+    *_, to_do = front(there)
+    assert to_do.items[0].startswith("Finding 1: In basketball look for")
+
+
 def test_markers_far_off_are_no_matter_of_the_forces(record):
     facts = record.facts.copy()
     facts["marker_rms_m"] = 0.025

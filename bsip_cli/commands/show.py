@@ -17,11 +17,11 @@ from bsip_cli.report.candidates import analysed, candidates_of, causes_of, effec
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.errors import overall_pieces, use_sentence
-from bsip_cli.report.participant.errors import largest_changes
+from bsip_cli.report.participant.errors import largest_changes, moment_change
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of
-from bsip_cli.report.words import listing
+from bsip_cli.report.words import count, listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
@@ -114,13 +114,12 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
         return searched(folder.name, diagnosis, facts), "\n".join(lines)
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
-    found = verdict_of(diagnosis, detection, gains, changes, budget)
+    light, large, _ = _of_the_page(folder)
+    found = verdict_of(diagnosis, detection, gains, changes, budget, large)
     right = corrected_sentence(_of_trials(folder, "marker-events"))
-    if light := _light(folder):
+    if light:
         found = replace(found, headline=f"{light.title}. {light.text}")
-    peaks = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
-    peaks_of_all = pd.concat(peaks, ignore_index=True) if peaks else pd.DataFrame()
-    changed = tuple(f"{said}." for said in largest_changes(peaks_of_all))
+    changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
     found = replace(found, results=(*found.results, *changed))
     return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
@@ -131,32 +130,44 @@ def _findings(
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
     error, which parameters to use. Of one among many the first."""
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
-    light = _light(folder) or light_of(diagnosis, detection, budget)
+    light, large, waits = _of_the_page(folder)
+    light = light or light_of(diagnosis, detection, budget)
     use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
     yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}")
     if not alone:
         return
     causes = causes_of(candidates_of(diagnosis))
-    everywhere = analysed(detection, diagnosis)
-    for number, cause in enumerate(causes[:_MOST], start=1):
-        yield _wrapped(cause_line(cause, everywhere), f"{number:2d}. ")
-    if len(causes) > _MOST:
-        yield f"  - {len(causes) - _MOST} more findings: --full"
+    everywhere, peaks = analysed(detection, diagnosis), _peaks(folder)
+    shown_here = causes[: _MOST - len(large)]
+    lines = [*large]
+    lines += [cause_line(c, everywhere, moment_change(c, causes, peaks)) for c in shown_here]
+    for number, line in enumerate(lines, start=1):
+        yield _wrapped(line, f"{number:2d}. ")
+    if more := len(causes) - len(shown_here):
+        yield f"  - {count(more, 'more finding')}: --full"
     if budget is not None and (pieces := overall_pieces(budget, effects_in(causes))):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
         yield _wrapped(f"The error of the table's parameters (RM): {parts}.", "  - ")
     if choice is not None:
         identified = _table(folder, "identification")
         assert identified is not None  # it was chosen among what was identified
-        yield _wrapped(use_sentence(choice, identified, light.state == "large"), "  - ")
+        yield _wrapped(use_sentence(choice, identified, waits), "  - ")
 
 
-def _light(folder: Path) -> Light | None:
-    """The answer on the report's first page; None where there is no report of this diagnosis."""
+def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], bool]:
+    """The answer on the report's first page, its finding of a large error if any, and whether that
+    has to be solved first; nothing where there is no report of this diagnosis."""
     page = _path(folder, "report-files")
     if not page.exists() or not is_made_from(page, _path(folder, "overall-diagnosis")):
-        return None
-    return Light(**read_header(page, "report-files")["provenance"]["facts"]["light"])
+        return None, (), False
+    facts = read_header(page, "report-files")["provenance"]["facts"]
+    return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("waits", False)
+
+
+def _peaks(folder: Path) -> pd.DataFrame:
+    """Joint peaks of all recordings, with a column ``trial``."""
+    peaks = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
+    return pd.concat(peaks, ignore_index=True) if peaks else pd.DataFrame()
 
 
 def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:

@@ -68,10 +68,11 @@ class Terms(Block):
 
 @dataclass(frozen=True)
 class Links(Block):
-    """Words and addresses (relative), one after the other, after a text."""
+    """Words and addresses (relative), one after the other, between a text and what follows."""
 
     text: str
     to: tuple[tuple[str, str], ...]
+    rest: str = ""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class Bar(Block):
 class Scale:
     """A number between what is good and what is too large, all in one unit; ``words`` say which it
     is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
-    arrow points."""
+    arrow points. ``other``: the number by other parameters; empty for none."""
 
     title: str
     shown: str
@@ -115,6 +116,7 @@ class Scale:
     good: str
     limit: str
     is_beyond: bool = False
+    other: str = ""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,10 @@ UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
 _ADVICE = re.compile(r"; ([^;]* look alike here: )?to distinguish them, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
-_OF_ALL = "; this is known from the laboratory"
+_OF_ALL = re.compile(  # what the laboratory is known to have, and what this person alone shows
+    r"; this is known from the laboratory \((?P<persons>\d+)[^()]*\)"
+    r"(?:, and this person's recordings alone (?P<how>also show it|leave it open): (?P<own>.*))?"
+)
 _REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
 _SIGNED = re.compile(r"[+−]\d")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
@@ -88,11 +91,22 @@ class Candidate:
     @property
     def is_of_all(self) -> bool:
         """The laboratory's, as all its persons together show it."""
-        return _OF_ALL in self.sentence
+        return bool(_OF_ALL.search(self.sentence))
+
+    def which_size(self, short: bool = False) -> str:
+        """Of a fault of the laboratory, why its size is the one to correct with, and this person's
+        own; empty of all others. ``short``: without the interval of that."""
+        found = _OF_ALL.search(self.sentence)
+        if not found:
+            return ""
+        own = (found["own"] or "").partition(", ")[0] if short else found["own"]
+        alone = f" (this person alone: {true_minus(own)})" if own else ""
+        persons = found["persons"]
+        return f"Correct with this size, as {persons} persons of the laboratory share it{alone}."
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
-        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence))
+        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", re.sub(_OF_ALL, "", self.sentence)))
         text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return true_minus(text)
@@ -100,7 +114,7 @@ class Candidate:
     def in_words(self, remarks: bool = True) -> str:
         """Its sentence with the interval of its main number, and what the markers alone say."""
         main, what = self.main_number(), self.what()
-        found = _REMARK.search(self.sentence) if remarks else None
+        found = _REMARK.search(self.sentence) if remarks and not self.is_of_all else None
         remark = found[0] if found else ""
         interval = main.interval(bool(_SIGNED.search(what))) if main else ""
         if main is None or not interval:

@@ -111,30 +111,34 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
 
 
 def use_sentence(
-    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+    choice: pd.DataFrame | None, identification: pd.DataFrame, waits: bool = False
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names."""
-    use = "Once the large error is gone, use" if is_wrong else "Use"
+    the artifacts of these names. ``waits``: something else is to be done first."""
+    use = "Once that is solved, use" if waits else "Use"
     if choice is None or choice.empty:
         return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
-    said = f"{use} {TEXTS['methods_in_full'][str(first['use'])]}{_compared(first)}."
     others = [
-        f"For {listing(list(rows['movement']))} use {method}: OM is "
-        f"{'' if method == OM else 'not '}clearly better there."
+        f"{TEXTS['methods'][str(method)]} for {listing(list(rows['movement']))}, where OM is "
+        f"{'' if method == OM else 'not '}clearly better"
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
+    most = TEXTS["methods_in_full"][str(first["use"])]
+    if others:
+        most = f"{TEXTS['methods'][str(first['use'])]} for all other movements"
+    said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
     rare = identification[identification["rare"].astype(bool)]
     warned = [
         f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
     ]
-    return " ".join([said, *others, *warned])
+    return " ".join([said, *warned])
 
 
-def _compared(first: pd.Series) -> str:
-    """What the choice rests on, to go on with after the method's name."""
+def _compared(first: pd.Series, together: bool) -> str:
+    """What the choice rests on, to go on with after the method's name; ``together``: over movements
+    of which some ask for another method."""
     if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
         return ": no recording is left to judge OM by"
     om, scaled, over_scaled = (
@@ -145,9 +149,12 @@ def _compared(first: pd.Series) -> str:
         "whole_trials": f"in {count(n, 'other recording')} ",
         "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
+    if together and where.startswith("in ") and n > 1:
+        where = "in both other recordings " if n == 2 else f"in all {where.removeprefix('in ')}"
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
-    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    table, times = "RM (table)", "RM+mass (RM, scaled)"
+    table = RM if together or first["use"] == RM else table
     said = f"{om} than {table} and {times}"
     if om != over_scaled:
         said = f"{om} than {table}, {over_scaled} than {times}"
@@ -175,7 +182,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
+SOURCES = "Good: Hansen 2017; large: Hicks 2015; markers: OpenSim."
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
@@ -185,16 +192,25 @@ Best Practices)."""
 @dataclass(frozen=True)
 class Yardstick:
     """``good`` and ``limit`` in ``unit``: up to the one it is as good as published, beyond the
-    other it is large."""
+    other it is large. ``brief``: its title where many stand in a line."""
 
     name: str
     title: str
+    brief: str
     unit: str
     good: float
     limit: float
 
     def in_sentence(self) -> str:
         return f"{self.title[:1].lower()}{self.title[1:]}"
+
+    def short(self) -> str:
+        """Before its size."""
+        return self.in_sentence().removesuffix(" error")
+
+    def brief_unit(self) -> str:
+        """Without of what."""
+        return self.unit.partition(" ")[0]
 
     def words(self, value: float) -> str:
         if not np.isfinite(value):
@@ -203,8 +219,9 @@ class Yardstick:
             return "large"
         return "good" if value <= self.good else "ordinary"
 
-    def scale(self, value: float) -> Scale:
-        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
+    def scale(self, value: float, other: str = "") -> Scale:
+        """On a scale from nothing to a fixed multiple of the limit, in every report the same.
+        ``other``: what other parameters give, in words."""
         end = ENDS_AT * self.limit
         return Scale(
             self.title,
@@ -213,9 +230,10 @@ class Yardstick:
             min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
-            f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
+            f"good to {self.good:.2g}",
+            f"large from {number(self.limit, 0)}",
             bool(value > end),
+            other,
         )
 
 
@@ -224,9 +242,9 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
     cop = _published("cop_error"), 1e3 * cop_limit_m
     force = _published("grf_vertical"), force_limit_percent
     return (
-        Yardstick(COP, "Centre of pressure (COP) error", "mm", *cop),
-        Yardstick(FORCE, "Vertical force error", "% of body weight", *force),
-        Yardstick(MARKERS, "Markers from model", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
+        Yardstick(COP, "Centre of pressure (COP) error", "COP", "mm", *cop),
+        Yardstick(FORCE, "Vertical force error", "vertical force", "% of body weight", *force),
+        Yardstick(MARKERS, "Markers from model", "marker", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
     )
 
 

@@ -2,97 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bsip_cli.report import blocks, verdict
-from bsip_cli.report.candidates import OF_THE_WEIGHT, analysed, effects_in, is_large
-from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.errors import (
-    COP_LIMIT_M,
-    ENDS_AT,
-    FORCE_LIMIT_PERCENT,
-    MARKERS,
-    SOURCES,
-    Yardstick,
-    errors_of,
-    overall_pieces,
-    use_sentence,
-    yardsticks,
+from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
+from bsip_cli.report.effect_words import effect_title, separating_recording
+from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentence
+from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.recordings import (
+    beyond,
+    is_said,
+    large_alone,
+    large_finding,
+    light_for,
+    measured_of,
+    must_wait,
+    names_of,
+    number_of_main_part,
+    use_lines,
+    worst_of,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
+from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, listing, number
+from bsip_cli.statistics.methods import RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 2  # causes, and things to do
+_MOST = 2  # findings in full
+_FEW = 3  # findings, whose actions are all given
+_MOST_KINDS = 4  # of findings that are named only
+_MOST_TO_DO = 3
 _POSES = 8  # among which the one is chosen that is shown
-_SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
     light = light_for(record)
+    has_findings = record.causes or large_finding(record)
     return (
         *portrait(record),
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
-        replace(light, text="") if record.causes and large_errors(record) else light,
-        blocks.Paragraph(_SIGNS, "note"),
+        replace(light, text="") if has_findings and light.state == "large" else light,
         *_causes(record),
-        *budget_bar(record),
-        blocks.Heading("How large are the errors?"),
-        blocks.Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        blocks.Paragraph(
-            f"Root mean square (RMS), with {METHODS[record.use()]}. Scales end at "
-            f"{ENDS_AT:g} × large. {SOURCES}",
-            "note",
-        ),
+        *_sizes(record),
         *_sure(record, light),
-        blocks.Heading("Which parameters to use"),
+        blocks.Heading("What may be used?"),
+        blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
-            use_sentence(record.choice, record.identification, light.state == "large")
+            use_sentence(record.choice, record.identification, waits=must_wait(record))
         ),
         blocks.Heading("What to do next"),
         blocks.Bullets(tuple(to_do(record, light))),
     )
 
 
-def light_for(record: ParticipantRecord) -> blocks.Light:
-    """The answer, as `bsip show` prints it too."""
-    large = large_errors(record)
-    return verdict.light_of(record.diagnosis, record.detection, record.budget, large, record.use())
-
-
-def large_errors(record: ParticipantRecord) -> list[str]:
-    """The yardsticks beyond which the errors are."""
-    return [
-        f"{one.in_sentence().removesuffix(' error')} {number(value)} {one.unit}"
-        for one, value in measured_of(record)
-        if one.words(value) == "large"
-    ]
-
-
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     """Names and what is known: the person, the recordings, the software."""
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
-    person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
+    sex = f"{_SEXES[facts['sex']]}, " if facts["sex"] in _SEXES else ""
+    person = f"{sex}{number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and number(plates, 1) != number(mass, 1):
         person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
     names = [trial.task for trial in record.trials]
     times = {name: names.count(name) for name in names}
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
-    dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
-    saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     short = abbreviations(names)
-    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}{saved}"
+    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}"
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
@@ -133,16 +117,47 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 
 
 def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """A line per cause that was found, the most probable first."""
+    """A line per finding, the most important first; of those that have no room what they are."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    lines = tuple(verdict.cause_line(cause, everywhere) for cause in record.causes)
-    if lines:
-        yield blocks.Numbered(lines[:_MOST])
-    if len(lines) > _MOST:
-        more = f"{count(len(lines) - _MOST, 'more finding')} below"
-        yield blocks.Links("", ((more, f"#{verdict.ALL_FAULTS}"),))
+    peaks, large = all_peaks(record.trials), large_finding(record)
+    shown = _causes_shown(record)
+    lines = [
+        verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
+        for cause in shown
+    ]
+    if large or lines:
+        yield blocks.Numbered((*large, *lines))
+    if more := record.causes[len(shown) :]:
+        address = (("More below", f"#{verdict.ALL_FAULTS}"),)
+        first = 1 + len(large) + len(shown)
+        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first))}.")
+
+
+def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str]:
+    """``3 and 5: marker not in its place``; findings of which one may be the other count together."""
+    groups: list[tuple[list[int], list[str]]] = []
+    for k, cause in enumerate(causes, first):
+        titles = [effect_title(one.effect) for one in cause]
+        mine = [group for group in groups if {*group[1]} & {*titles}]
+        merged = [k, *(n for numbers, _ in mine for n in numbers)]
+        titles = [*(title for _, others in mine for title in others), *titles]
+        groups = [group for group in groups if group not in mine]
+        groups.append((sorted(merged), titles))
+    groups.sort()
+    for numbers, titles in groups[:_MOST_KINDS]:
+        which = listing([str(k) for k in numbers])
+        if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+            which = f"{numbers[0]} to {numbers[-1]}"
+        yield f"{which}: {' / '.join(dict.fromkeys(titles))}"
+    if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
+        yield f"{rest} more"
+
+
+def _causes_shown(record: ParticipantRecord) -> tuple[Sequence[Candidate], ...]:
+    """Those of which the page says all."""
+    return record.causes[: _MOST - len(large_finding(record))]
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -150,18 +165,35 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     made."""
     if record.diagnosis is None or record.detection is None:
         return
+    unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        unknown = ", its cause is not known" if verdict.CAUSE_UNKNOWN in light.title else ""
-        said.append(f"That the error is large is certain{unknown}.")
-    if any(not is_large(cause) for cause in record.causes):
-        said.append("Each fault states its own probability.")
-    elif light.state != "large":
+        known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+        said.append(f"The large error is certain{'' if known else ', its cause unknown'}.")
+        unseen = unseen if known else verdict.MAY_HIDE
+    elif not record.causes:
         said.append("No fault is more probable than not.")
-    yield blocks.Heading("How sure is this?")
-    yield blocks.Paragraph(
-        " ".join((*said, verdict.unseen(record.detection, record.diagnosis))).rstrip()
-    )
+    said.append(unseen)
+    if text := " ".join(filter(None, said)):
+        yield blocks.Heading("How sure is this?")
+        yield blocks.Paragraph(text)
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
+    """The yardsticks, and what makes the error: each says of which parameters it is."""
+    use, bar = record.use(), tuple(budget_bar(record))
+    table = {one.name: number(size) for one, size in measured_of(record, RM)} if bar else {}
+    scales = []
+    for one, size in measured_of(record):
+        other = table.get(one.name, number(size))
+        scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
+    yield blocks.Heading(f"How large are the errors with {METHODS[use]}?")
+    yield blocks.Scales(tuple(scales))
+    yield blocks.Paragraph(SOURCES, "note")
+    yield from bar
 
 
 def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
@@ -169,55 +201,52 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
-        yield blocks.Bar(
-            "What makes the squared error of the forces with a table's parameters (RM)", pieces
-        )
-
-
-# --- how large ----------------------------------------------------------------------------------
-
-
-def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...]:
-    """The three yardsticks with this person's numbers, by the method that is to be used."""
-    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
-    values = errors_of(fits, record.use()) | {MARKERS: 1e3 * float(record.facts["marker_rms_m"])}
-    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
-    return tuple((one, values[one.name]) for one in yardsticks(*limits))
+        use = record.use()
+        other = f" of {METHODS[RM]}, not {use}" if use != RM else ", by cause"
+        yield blocks.Bar(f"What makes the squared error{other}", pieces)
 
 
 # --- what to do ---------------------------------------------------------------------------------
 
 
 def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
-    """Whether the data may be used, and at most two things to do."""
-    causes = record.causes
+    """At most three things."""
+    causes, first = _causes_shown(record), 1 + len(large_finding(record))
+    few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
-    said = [TEXTS["usable"][light.state], *said]
-    said += verdict.consequences(causes[:_MOST], only_actions=True)
-    groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
+    said += _look_at(record)
+    said += verdict.consequences(few, first, only_actions=True)
+    groups = [(k, cause) for k, cause in enumerate(causes, first) if len(cause) > 1]
     for k, cause in groups[:1]:
         members = [(one.effect, one.target) for one in cause]
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    large = [one for one, value in measured_of(record) if one.words(value) == "large"]
-    if light.state == "inconclusive" and not large:
+    if not beyond(record) and (alone := large_alone(record)):
+        where = listing([names_of(record)[trial.stem] for trial in alone])
+        said.append(TEXTS["to_do"]["forces"].format(trial=where))
+    if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
-    said += [text for one in large[:1] if (text := _where_large(record, one))]
-    if len(said) == 1 and len(rows := record.excitation.query("quantity == 'next'")):
+    if light.state == "fine" and not said:
+        said.append(TEXTS["usable"]["fine"])
+    rows = record.excitation.query("quantity == 'next'")
+    if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
-    return said[: _MOST + 1]
+    return said[:_MOST_TO_DO]
 
 
-def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
-    """Where to look for what makes an error large; empty where no recording has it."""
-    if yardstick.name == MARKERS:
-        return str(TEXTS["to_do"]["markers"])
-    fits = {t.label: t.fit for t in record.moving_trials() if t.fit is not None}
-    sizes = {label: errors_of([fit], record.use())[yardstick.name] for label, fit in fits.items()}
-    known = {label: size for label, size in sizes.items() if np.isfinite(size)}
-    if not known:
-        return ""
-    worst = max(known, key=known.__getitem__)
-    return str(TEXTS["to_do"]["forces"]).format(trial=worst, error=yardstick.in_sentence())
+def _look_at(record: ParticipantRecord) -> Iterator[str]:
+    """Where to look for what makes the largest error, which is the first finding; nothing where
+    another finding makes the largest part."""
+    if number_of_main_part(record):
+        return
+    is_finding = bool(large_finding(record)) or is_said(record)
+    number_of_it = "Finding 1: " if is_finding else ""
+    texts = TEXTS["to_do"]
+    for one, _ in beyond(record)[:1]:
+        worst = worst_of(record, one)
+        if one.name == MARKERS:
+            yield f"{number_of_it}{texts['markers']}"
+        elif worst is not None:
+            yield f"{number_of_it}{texts['forces'].format(trial=names_of(record)[worst.stem])}"

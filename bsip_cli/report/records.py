@@ -43,8 +43,7 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class TrialRecord:
-    """One trial; a table is None where a stage did not make it. ``file_date``: when the recording's
-    file was last changed (ISO), empty where it is not there."""
+    """One trial; a table is None where a stage did not make it."""
 
     stem: str
     task: str
@@ -57,7 +56,6 @@ class TrialRecord:
     marker_events: pd.DataFrame | None = None
     joint_moments: pd.DataFrame | None = None
     joint_peaks: pd.DataFrame | None = None
-    file_date: str = ""
 
     @property
     def label(self) -> str:

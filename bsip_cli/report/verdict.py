@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from string import ascii_lowercase
@@ -25,6 +26,7 @@ from bsip_cli.report.candidates import (
     limits_of,
     limits_sentence,
 )
+from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     OBJECTS,
@@ -51,13 +53,15 @@ ALL_FAULTS = "wrong"  # address of the section that has all of them
 _NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
-_MOST_MEMBERS = 2  # of a group, in a line
+_MOST_MEMBERS = 2  # of a group, in a line with their sizes
 _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
 _UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
+MAY_HIDE = "Faults of any size may hide behind so large an error."
+NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
 _OR_THE_MASS = ", or the stated mass is wrong"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
@@ -87,10 +91,11 @@ def verdict_of(
     gains: pd.DataFrame | None = None,
     changes: pd.DataFrame | None = None,
     budget: pd.DataFrame | None = None,
+    before: Sequence[str] = (),
 ) -> Verdict:
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
     ``gain`` and ``bsip-change``, with one method each. ``budget``: ``overall-error-budget``, where
-    it is known."""
+    it is known. ``before``: findings of the report that come before those of the diagnosis."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = analysed(detection, diagnosis)
     light = light_of(diagnosis, detection, budget)
@@ -98,13 +103,13 @@ def verdict_of(
     return Verdict(
         f"{light.title}. {light.text}".rstrip(),
         bool(causes),
-        tuple(cause_text(cause, everywhere) for cause in causes),
+        (*before, *(cause_text(cause, everywhere) for cause in causes)),
         (
             *(errors.budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
             *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
-        (*filter(None, [_named_twice(causes)]), *consequences(causes)),
+        (*filter(None, [_named_twice(causes)]), *consequences(causes, 1 + len(before))),
         unseen(detection, diagnosis),
     )
 
@@ -112,7 +117,7 @@ def verdict_of(
 def unseen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> str:
     """What might have been missed; empty where that is not known."""
     if any(is_large(cause) for cause in causes_of(candidates_of(diagnosis))):
-        return "Faults of any size may hide behind so large an error."
+        return MAY_HIDE
     return limits_sentence(limits_of(detection, diagnosis))
 
 
@@ -122,10 +127,12 @@ def light_of(
     budget: pd.DataFrame | None = None,
     large: Sequence[str] | None = None,
     use: str = RM,
+    alone: Sequence[str] = (),
 ) -> Light:
     """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
     nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are with
-    the method ``use``, None where that is not known; ``budget`` is of RM's."""
+    the method ``use``, None where that is not known; ``alone``: the recordings whose own errors
+    are; ``budget`` is of RM's."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
@@ -135,7 +142,7 @@ def light_of(
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
     looked = count(len(analysed(detection, diagnosis)), "recording")
-    nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+    nothing = f"{capital(NONE_FOUND)} in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
         more = "also " if found and any(map(is_large, causes)) else ""
@@ -143,13 +150,14 @@ def light_of(
         title = "; ".join(filter(None, (error, f"{more}{found}")))
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
+    no_large = f"no large error{f' but in {listing(alone)}' if alone else ''}"
     if not causes:
-        title = "No fault found" if large is None else "Fine: no fault found, no large error"
+        title = "No fault found" if large is None else f"Fine: no fault found, {no_large}"
         return Light("fine", title, nothing)
     share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
-    title = capital(found) if large is None else f"{capital(found)}; no large error"
+    named = "" if np.isnan(share) else f"What was found makes {size} of RM's squared error."
+    title = capital(found) if large is None else f"{capital(found)}; {no_large}"
     return Light("cause", title, named or f"Searched: {looked}.")
 
 
@@ -170,18 +178,26 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
+    most = main_part(budget, found, use)
+    if most is not None:
+        how = "most" if most.share > 50.0 else "the largest part"
+        return f", {how} of it {most.label} ({number(most.share, 0)} %)"
+    is_of_the_table = main_part(budget, found, RM) is not None
+    return " even with identified parameters" if is_of_the_table else f", {CAUSE_UNKNOWN}"
+
+
+def main_part(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> Piece | None:
+    """Of a large error with the method ``use``, what makes the largest part; None if unknown."""
     parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
     most = max(parts, key=lambda one: one.share, default=None)
     if most is None or most.label in (errors.UNKNOWN, errors.REST):
-        return f", {CAUSE_UNKNOWN}"
-    if use == OM and errors.PARAMETERS in most.label:
-        return " even with identified parameters"
-    how = "most" if most.share > 50.0 else "the largest part"
-    return f", {how} of it {most.label} ({number(most.share, 0)} %)"
+        return None
+    return None if use == OM and errors.PARAMETERS in most.label else most
 
 
-def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
-    """What, how large compared with what laboratories meet, where and how sure, as short as possible."""
+def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints: str = "") -> str:
+    """What, how large compared with what laboratories meet, where and how sure, as short as
+    possible; ``at_joints``: what it changes there."""
     sure = probability_words(probability_of(cause))
     if len(cause) > 1:
         return _group_line(cause, sure)
@@ -192,8 +208,10 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     if is_large(cause):
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
-    sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.in_words(remarks=one.is_of_all))}, {where}{one.against_usual()}{sure}."
+    said = [one.against_usual(), f"; {at_joints}" if at_joints else ""]
+    said += [f"; probability {sure}" if sure else ""]
+    line = f"{capital(one.in_words(remarks=False))}, {where}{''.join(said)}."
+    return f"{line} {one.which_size(short=True)}".rstrip()
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -208,14 +226,14 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
     members = [
         "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]
-        for one, text in ranked[:_MOST_MEMBERS]
+        for one, text in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
     ]
-    if len(cause) > _MOST_MEMBERS:
-        members.append(count(len(cause) - _MOST_MEMBERS, "other"))
+    places = Counter(effect_title(one.effect) for one, _ in ranked[len(members) :])
+    others = [f"{title} ({n} places)" if n > 1 else title for title, n in places.items()]
     head = f"{capital(common)}: one" if common else "One"
     return (
-        f"{head} of {len(cause)} causes that look alike here: {', or '.join(members)}; probability "
-        f"that it is one of them {sure}."
+        f"{head} of {len(cause)} causes that look alike here: {'; '.join((*members, *others))}. "
+        f"Together {sure}."
     )
 
 
@@ -227,7 +245,8 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     first = cause[0]
     places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], _how_sure(cause)
     if len(cause) == 1:
-        return f"{capital(first.in_words())}{places[0]}. {sure}".rstrip()
+        said = (f"{capital(first.in_words())}{places[0]}.", sure, first.which_size())
+        return " ".join(filter(None, said))
     common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
     members = []
     for k, (one, place) in enumerate(zip(cause, own, strict=True)):
@@ -369,18 +388,18 @@ def corrected_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str,
 
 
 def consequences(
-    causes: Sequence[Sequence[Candidate]], only_actions: bool = False
+    causes: Sequence[Sequence[Candidate]], first: int = 1, only_actions: bool = False
 ) -> tuple[str, ...]:
     """What the causes mean for the reader and what is to be done, or the latter only; each once and
-    with the numbers of its causes."""
+    with the numbers of its causes, of which the ``first`` is given."""
     numbers: dict[str, list[int]] = {}
-    for k, cause in enumerate(causes, start=1):
+    for k, cause in enumerate(causes, start=first):
         if only_actions and (is_large(cause) or len(cause) > 1):
             continue  # of these another line says where to look, and what to record
         for meaning, action in _consequences_of(cause):
             text = action if only_actions else f"{meaning} {action}".rstrip()
             numbers.setdefault(text, []).append(k)
-    if len(causes) == 1 and not only_actions:
+    if len(causes) == first == 1 and not only_actions:
         return tuple(filter(None, numbers))
     return tuple(
         f"{'Finding' if len(of) == 1 else 'Findings'} {listing([str(k) for k in of])}: {text}"

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from datetime import date
 from pathlib import Path
 
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
 from bsip_cli.report.blocks import FILES, Document, Grid, Picture, render
-from bsip_cli.report.first_page import light_for
 from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.recordings import large_finding, light_for, must_wait
 from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord, with_all_causes
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.running.unit import Unit
@@ -37,7 +36,8 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    unit.write("report-files", rows, facts={"light": asdict(light)})
+    facts = {"light": asdict(light), "large": large_finding(record), "waits": must_wait(record)}
+    unit.write("report-files", rows, facts=facts)
 
 
 def write_page(unit: Unit, document: Document) -> list[Path]:
@@ -96,8 +96,7 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> Tr
     for name in ("reconstruction", "fit"):
         table = tables[name]
         tables[name] = with_all_causes(table) if table is not None else None
-    changed = date.fromtimestamp(trial.path.stat().st_mtime) if trial.path.exists() else ""
-    return TrialRecord(trial.stem, trial.task, trial.role, **tables, file_date=str(changed))
+    return TrialRecord(trial.stem, trial.task, trial.role, **tables)
 
 
 def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:

@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.blocks import Light, Picture
+from bsip_cli.report.blocks import Light, Numbered, Picture
 from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.first_page import front
 from bsip_cli.report.participant import errors
 from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.recordings import large_finding, light_for
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
 from bsip_cli.report.words import number, with_spread
@@ -132,15 +133,21 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "2 faults found; no large error" in first
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "both recordings, a usual size (1 to 4°); probability 99.5 %." in first
+        "both recordings, a usual size (1 to 4°); changes the left knee's moment by 9 % of its "
+        "peak; probability 99.5 %." in first
     )
-    assert "One of 2 causes that look alike here: " in first
+    assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
+    assert "How large are the errors with OM (identified)?" in first
+    assert "What makes the squared error of RM (table), not OM" in first
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
-    assert "Use OM (segment parameters identified from this person): in " in first
-    assert "it errs 34 to 46 % less than RM (table)," in first
-    assert "For basketball use RM: OM is not clearly better there." in first
+    assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
+    assert (
+        "Once that is solved, use RM (table) for basketball, where OM is not clearly better, and "
+        "OM (identified) for all other movements: in both other recordings it errs 34 to 46 % less "
+        "than RM," in first
+    )
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
 
@@ -194,17 +201,26 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
     assert (light.state, light.title) == ("large", "Large error even with identified parameters")
-    assert light.text.startswith(
+    (finding,) = large_finding(large)
+    assert finding.startswith(
+        "Large error with OM (identified): vertical force 5.5 %, most in sequence; cause unknown: "
+        "none of the"
+    )
+    (numbered,) = (block for block in front(large) if isinstance(block, Numbered))
+    assert numbered.items == (finding,)
+    assert light_for(large).text.startswith(
         "Large with OM (identified): vertical force 5.5 % of body weight. None of the"
     )
     *_, to_do = front(large)
-    assert not any("nothing needs to be corrected" in item for item in to_do.items)
+    assert to_do.items[0].startswith("Finding 1: In sequence look for feet or hands off the plates")
+    assert not any("Nothing needs to be corrected" in item for item in to_do.items)
 
 
 def test_what_is_fine_is_to_be_used_as_it_is(record):
     nothing = record.diagnosis[record.diagnosis["verdict"] == "rejected"]
-    *_, to_do = front(replace(record, diagnosis=nothing, refusals=()))
-    assert to_do.items[0].startswith("The data may be used: nothing")
+    *_, use, _, _, to_do = front(replace(record, diagnosis=nothing, refusals=()))
+    assert use.items == ("Use (motion, forces, joint moments): all recordings.",)
+    assert to_do.items[0] == "Nothing needs to be corrected."
     assert (
         to_do.items[1] == "Optional, to know the parameters better, record: swing the left shank."
     )
@@ -213,10 +229,13 @@ def test_what_is_fine_is_to_be_used_as_it_is(record):
 def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(choice, record.identification)
-    assert said.startswith("Use RM (segment parameters of an anthropometric table)")
+    assert said.startswith("Use RM (parameters of an anthropometric table)")
     assert (
         ": OM (identified) is not clearly better; in 2 other recordings it errs 5 % less to" in said
     )
+    one = use_sentence(record.choice[:1], record.identification)
+    assert one.startswith("Use OM (parameters identified from this person): in 2 other recordings")
+    assert "it errs 34 to 46 % less than RM (table)," in one
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

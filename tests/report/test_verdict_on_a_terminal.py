@@ -49,7 +49,7 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     assert text.startswith("sub-01: 2 faults found")
     flat = " ".join(text.split())
     assert " 1. Plate 1 is turned by +2.0 degrees" in flat
-    assert "Use OM (segment parameters identified" in flat
+    assert "and OM (identified) for all other movements" in flat
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
     assert "Identification (OM against RM) changes" in " ".join(full.split())

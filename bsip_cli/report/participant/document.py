@@ -28,6 +28,7 @@ from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.participant import errors
+from bsip_cli.report.recordings import large_finding, uses_of
 from bsip_cli.report.words import (
     MISSING,
     ROLES,
@@ -50,7 +51,7 @@ def participant_document(record: records.ParticipantRecord) -> Document:
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
-        subtitle="Ground forces measured by plates, against those computed from markers.",
+        subtitle="Ground forces: measured by plates, computed from markers.",
         front=front(record),
         sections=(
             diagnosis_section(record),
@@ -83,23 +84,25 @@ def recording_section(record: records.ParticipantRecord) -> Section:
 
 
 def _trials(record: records.ParticipantRecord) -> Grid:
+    uses = uses_of(record)
     head = (
         "recording",
         "role",
+        "use",
         "duration [s]",
         "forces compared [%]",
         "pose known [%]",
         "markers [mm]",
     )
-    rows = tuple(_trial_row(trial) for trial in record.trials)
-    return Grid(head, rows, TEXTS["captions"]["trials"], words=2)
+    rows = tuple(_trial_row(trial, uses[trial.stem].in_words()) for trial in record.trials)
+    return Grid(head, rows, TEXTS["captions"]["trials"], words=3)
 
 
-def _trial_row(trial: records.TrialRecord) -> tuple[str | Cell, ...]:
+def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
     role = ROLES[trial.role]
     frame = trial.kinematics
     if frame is None or frame.empty:
-        return (trial.label, role, MISSING, MISSING, MISSING, MISSING)
+        return (trial.label, role, use, MISSING, MISSING, MISSING, MISSING)
     compared = np.nan
     if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
         compared = float(records.flags_of(trial.reconstruction, "valid").mean())
@@ -108,6 +111,7 @@ def _trial_row(trial: records.TrialRecord) -> tuple[str | Cell, ...]:
     return (
         trial.label,
         role,
+        use,
         number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
         percent(compared),
         percent(float(frame["determined"].astype(float).mean())),
@@ -323,7 +327,7 @@ def diagnosis_section(record: records.ParticipantRecord) -> Section:
         blocks: tuple[Block, ...] = (Paragraph(verdict.NOT_RUN, "note"),)
         return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
     tables = (record.diagnosis, record.detection, record.gains, record.changes)
-    said = verdict.verdict_of(*tables)
+    said = verdict.verdict_of(*tables, before=large_finding(record))
     events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
     named_from = percent(record.option("diagnosis", "named_from"))
     blocks = (

@@ -10,7 +10,7 @@ import pandas as pd
 
 from bsip_cli.report import errors
 from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section, picture
-from bsip_cli.report.candidates import effects_in
+from bsip_cli.report.candidates import Candidate, effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
@@ -272,11 +272,7 @@ def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
 
 def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)) -> Iterator[str]:
     """What identification, and each named fault, changes most: a sentence each."""
-    if peaks.empty:
-        return
-    asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
-    known = peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
-    for method, rows in known.groupby("method", sort=False):
+    for method, rows in _changed(peaks, kinds).groupby("method", sort=False):
         if method == OM or is_extended(str(method)):
             most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
             what = "Identification (OM against RM)"
@@ -287,6 +283,38 @@ def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)
                 f"by {signed(most['change_Nm'], 1)} N m, {number(most['change_percent'], 0)} % of "
                 "that joint's peak"
             )
+
+
+def moment_change(
+    cause: Sequence[Candidate], causes: Sequence[Sequence[Candidate]], peaks: pd.DataFrame
+) -> str:
+    """What a named fault changes most at the joints, in a clause; empty where it is not known, or
+    not known of it alone. ``causes``: all that was found; ``peaks``: of all recordings."""
+    one = cause[0]
+    alike = [c for other in causes for c in other if c.effect == one.effect]
+    if len(cause) > 1 or any(c != one and {*c.trials} & {*one.trials} for c in alike):
+        return ""
+    known = _changed(peaks, (*_LEGS, *_ARMS))
+    is_of_it = known["method"].str.endswith(f"+{one.effect}")
+    rows = known[is_of_it & known["trial"].isin(one.trials)]
+    if rows.empty:
+        return ""
+    most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
+    percent = most["change_percent"]
+    if rows["change_percent"].max() < 1.0:
+        return "changes no joint moment by 1 %"
+    return (
+        f"changes the {in_words(most['joint'])}'s moment by "
+        f"{number(percent, 0 if percent >= 1.0 else 1)} % of its peak"
+    )
+
+
+def _changed(peaks: pd.DataFrame, kinds: Sequence[str]) -> pd.DataFrame:
+    """Rows of known changes at joints of these kinds."""
+    if peaks.empty:
+        return pd.DataFrame(columns=["method", "trial"], dtype=str)
+    asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
+    return peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
 
 
 def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[TrialRecord]) -> Grid:

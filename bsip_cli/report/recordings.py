@@ -1,0 +1,254 @@
+"""How large the errors of a person's recordings are with the parameters to use; which recordings may
+still be used, and for what."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.report import verdict
+from bsip_cli.report.blocks import Light
+from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
+from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
+from bsip_cli.report.errors import (
+    COP,
+    COP_LIMIT_M,
+    FORCE,
+    FORCE_LIMIT_PERCENT,
+    MARKERS,
+    Yardstick,
+    errors_of,
+    yardsticks,
+)
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of
+from bsip_cli.statistics.methods import OM
+
+_IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
+_OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
+_MOST_REASONS = 4  # in a line
+_MOST_RUNS = 4  # of a task, in a line
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yardstick, float], ...]:
+    """The three yardsticks with this person's numbers, by a method, or by the one to use."""
+    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
+    values = errors_of(fits, method or record.use())
+    values[MARKERS] = 1e3 * float(record.facts["marker_rms_m"])
+    return tuple((one, values[one.name]) for one in _yardsticks(record))
+
+
+def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
+    """The yardsticks beyond which the errors of all recordings together are."""
+    return _large(measured_of(record))
+
+
+def large_alone(record: ParticipantRecord, with_markers: bool = False) -> list[TrialRecord]:
+    """Recordings in motion with an error of the forces, or of the markers too, beyond a yardstick."""
+    asked = (COP, FORCE, MARKERS) if with_markers else (COP, FORCE)
+    found = ((trial, _large(_own(record, trial))) for trial in record.moving_trials())
+    return [trial for trial, large in found if any(one.name in asked for one, _ in large)]
+
+
+def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | None:
+    """The recording in motion where an error is largest; None where none has it."""
+    sizes = {
+        trial.stem: size
+        for trial in record.moving_trials()
+        for one, size in _own(record, trial)
+        if one == yardstick and np.isfinite(size)
+    }
+    worst = max(sizes, key=sizes.__getitem__, default="")
+    return next((trial for trial in record.trials if trial.stem == worst), None)
+
+
+def names_of(record: ParticipantRecord) -> dict[str, str]:
+    """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
+    tasks = [task_of(trial.stem) for trial in record.trials]
+    return {
+        trial.stem: task if tasks.count(task) == 1 else re.sub(r"[()]", "", trial.label)
+        for trial, task in zip(record.trials, tasks, strict=True)
+    }
+
+
+def _yardsticks(record: ParticipantRecord) -> tuple[Yardstick, ...]:
+    """With the limits that the diagnosis was run with."""
+    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
+    return yardsticks(*limits)
+
+
+def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick, float], ...]:
+    """The yardsticks with a recording's own numbers, by the method to use."""
+    values = errors_of([] if trial.fit is None else [trial.fit], record.use())
+    markers = np.empty(0) if trial.kinematics is None else trial.kinematics["marker_rms_m"]
+    squares = np.asarray(markers, dtype=float) ** 2
+    squares = squares[np.isfinite(squares)]
+    values[MARKERS] = 1e3 * float(np.sqrt(squares.mean())) if len(squares) else np.nan
+    return tuple((one, values[one.name]) for one in _yardsticks(record))
+
+
+def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
+    return [(one, size) for one, size in sizes if one.words(size) == "large"]
+
+
+# --- the answer, and the finding that it is -------------------------------------------------------
+
+
+def light_for(record: ParticipantRecord) -> Light:
+    """The answer, as `bsip show` prints it too."""
+    large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
+    alone = [names_of(record)[trial.stem] for trial in large_alone(record, with_markers=True)]
+    tables = record.diagnosis, record.detection, record.budget
+    return verdict.light_of(*tables, large, record.use(), alone)
+
+
+def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
+    """The first finding where errors are large and the diagnosis has none that says so: how large,
+    where most, whether the cause is known; else none."""
+    found = beyond(record)
+    if not found or is_said(record) or light_for(record).state != "large":
+        return ()
+    sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
+    said = f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
+    worst = worst_of(record, found[0][0])
+    if worst is not None:
+        said += f", most in {names_of(record)[worst.stem]}"
+    if all(one.name == MARKERS for one, _ in found):
+        return (f"{said}.",)
+    return (f"{said}; {_why_large(record, worst)}.",)
+
+
+def is_said(record: ParticipantRecord) -> bool:
+    """Whether the diagnosis has a finding of a large error where the largest one is."""
+    worst = [worst_of(record, one) for one, _ in beyond(record)[:1]]
+    return any(
+        is_large(cause) and all(one is None or _concerns(cause, one) for one in worst)
+        for cause in record.causes
+    )
+
+
+def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
+    """What makes the largest part, as far as the budget of the parameters to use tells."""
+    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    if part is None:
+        if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
+            return "other findings explain part at most"
+        return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
+    number_of = number_of_main_part(record)
+    return f"the largest part is {f'finding {number_of}' if number_of else part.label}"
+
+
+def number_of_main_part(record: ParticipantRecord) -> int:
+    """Of the finding that makes the largest part of a large error of forces; 0 if none does."""
+    if all(one.name == MARKERS for one, _ in beyond(record)):
+        return 0
+    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    label = "" if part is None else part.label
+    numbered = enumerate(record.causes, start=1 if is_said(record) else 2)
+    return next((k for k, c in numbered if effect_title(c[0].effect) in label), 0)
+
+
+# --- which recordings may be used ---------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Use:
+    """What a recording may be used for, a key of ``uses`` in the texts, and why for no more;
+    ``brief``: the same where many stand in a line."""
+
+    kind: str
+    why: str = ""
+    brief: str = ""
+
+    def in_words(self) -> str:
+        """For a cell."""
+        return TEXTS["uses"][self.kind]["short"] + (f" ({self.why})" if self.why else "")
+
+
+def use_lines(record: ParticipantRecord) -> Iterator[str]:
+    """A line per kind of use, the best first."""
+    if light_for(record).state == "inconclusive":
+        yield TEXTS["usable"]["inconclusive"]
+        return
+    names, uses = names_of(record), uses_of(record)
+    for kind, words in TEXTS["uses"].items():
+        because: dict[str, list[str]] = {}
+        for stem, use in uses.items():
+            if use.kind == kind:
+                because.setdefault(use.brief or use.why, []).append(stem)
+        if len(because) > _MOST_REASONS:
+            stems = [stem for of in because.values() for stem in of]
+            because = {"each for the reason below": stems}
+        parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
+        if parts:
+            yield f"{words['long']}: {'; '.join(parts)}."
+
+
+def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
+    """``all recordings``, their names, or how many of each task."""
+    if len(stems) == len(names):
+        return "all recordings"
+    items: list[str] = []
+    for task in dict.fromkeys(map(task_of, stems)):
+        of = [names[stem] for stem in stems if task_of(stem) == task]
+        items += [f"{len(of)} × {task}"] if len(of) > _MOST_RUNS else of
+    return listing(items)
+
+
+def must_wait(record: ParticipantRecord) -> bool:
+    """Whether no parameters should be used yet: errors are large and no recording may be used, or
+    not all of those may that identified the parameters to use."""
+    uses = uses_of(record)
+    usable = {stem for stem, use in uses.items() if use.kind in ("full", "care")}
+    own = {trial.stem for trial in record.identification_trials()} if record.use() == OM else set()
+    return not own <= usable or (light_for(record).state == "large" and not usable)
+
+
+def uses_of(record: ParticipantRecord) -> dict[str, Use]:
+    """Of each recording, by its stem, as far as its errors and the findings tell."""
+    first = 1 + len(large_finding(record))
+    return {trial.stem: _use_of(record, trial, first) for trial in record.trials}
+
+
+def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
+    """By the worst of its markers, its forces and the findings that concern it; ``first``: the
+    number of the first finding of the diagnosis."""
+    if trial.kinematics is None or trial.kinematics.empty:
+        return Use("out", "no motion was computed")
+    found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
+    large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
+    sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
+    if MARKERS in sizes:
+        return Use("out", listing([*sizes.values()]), sizes[MARKERS])
+    unexplained = _numbered([k for k, cause in found.items() if is_large(cause)])
+    moved = _numbered([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
+    if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
+        after = f"after {moved}" if moved else ""
+        return Use("motion", "; ".join(filter(None, (listing(wrong), after))), after or wrong[0])
+    if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
+        return Use("motion", "forces could not be compared")
+    correct = _numbered([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
+    if correct:
+        return Use("corrected", correct)
+    return Use("care" if found else "full", _numbered([*found]))
+
+
+def _numbered(findings: Sequence[int]) -> str:
+    words = "finding" if len(findings) == 1 else "findings"
+    return f"{words} {listing([str(k) for k in findings])}" if findings else ""
+
+
+def _concerns(cause: Sequence[Candidate], trial: TrialRecord) -> bool:
+    """What quiet stance shows of a mass or a plate concerns all recordings."""
+    is_of_all = cause[0].class_id == OF_THE_WEIGHT
+    return is_of_all or any(trial.stem in one.trials for one in cause)
+
+
+def _families(cause: Sequence[Candidate]) -> set[str]:
+    return {EFFECT_WORDS[one.effect].family for one in cause}

@@ -1,0 +1,352 @@
+"""Which recordings may be used and for what; the findings of the first page, and their numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bsip_cli.commands.show import shown
+from bsip_cli.report.blocks import Links, Numbered
+from bsip_cli.report.candidates import candidates_of, causes_of
+from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.errors import COP, FORCE, MARKERS
+from bsip_cli.report.first_page import front
+from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.recordings import (
+    beyond,
+    large_finding,
+    light_for,
+    measured_of,
+    must_wait,
+    number_of_main_part,
+    use_lines,
+    uses_of,
+    worst_of,
+)
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.verdict import cause_line, cause_text, consequences
+from bsip_cli.stages.report import record_of
+from tests.report.fake_study import Artifacts, diagnosis
+
+STATIC = "sub-01_task-static"
+SEQUENCE, BASKETBALL = "sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"
+TRIALS = [SEQUENCE, BASKETBALL]
+FOUND = diagnosis(TRIALS)
+TURNED = FOUND[FOUND["rank"] == 1]
+
+
+@pytest.fixture(scope="module")
+def record(reports) -> ParticipantRecord:
+    return record_of(reports.unit("report", reports.study.participants[0]))
+
+
+def fault(effect: str, trials: str, **changes) -> pd.DataFrame:
+    """Rows of a diagnosis that names it."""
+    return TURNED.assign(effect=effect, trials=trials, **changes)
+
+
+def with_faults(record: ParticipantRecord, *faults: pd.DataFrame) -> ParticipantRecord:
+    nothing = FOUND[FOUND["verdict"] == "rejected"]
+    rows = [one.assign(rank=10 + k, rms_change=20.0 - k) for k, one in enumerate(faults)]
+    return replace(record, diagnosis=pd.concat([*rows, nothing], ignore_index=True))
+
+
+def with_error(record: ParticipantRecord, stem: str, **columns) -> ParticipantRecord:
+    """With these numbers in the errors of a recording; those of forces where there were any."""
+
+    def changed(trial: TrialRecord) -> TrialRecord:
+        kept = {
+            name: trial.fit[name].where(trial.fit[name].isna(), x) for name, x in columns.items()
+        }
+        return replace(trial, fit=trial.fit.assign(**kept)) if trial.stem == stem else trial
+
+    return replace(record, trials=tuple(map(changed, record.trials)))
+
+
+def with_trial(record: ParticipantRecord, stem: str, **tables) -> ParticipantRecord:
+    trials = (replace(t, **tables) if t.stem == stem else t for t in record.trials)
+    return replace(record, trials=tuple(trials))
+
+
+def kinds_of(record: ParticipantRecord) -> list[str]:
+    return [use.kind for use in uses_of(record).values()]
+
+
+# --- which may be used --------------------------------------------------------------------------
+
+
+def test_all_may_be_used_where_nothing_is_wrong(record):
+    fine = with_faults(record)
+    assert kinds_of(fine) == ["full", "full", "full"]
+    assert list(use_lines(fine)) == ["Use (motion, forces, joint moments): all recordings."]
+
+
+@pytest.mark.parametrize(
+    ("effect", "kind"),
+    [
+        ("sync_offset", "corrected"),
+        ("released_object", "corrected"),
+        ("marker_shift", "corrected"),
+        ("wobbling_mass", "care"),
+        ("unexplained", "care"),
+    ],
+)
+def test_a_recording_with_a_fault_waits_for_what_can_be_done(record, effect, kind):
+    faulty = with_faults(record, fault(effect, BASKETBALL, target="1 fz"))
+    assert kinds_of(faulty) == ["full", "full", kind]
+    assert list(use_lines(faulty))[1].endswith(": basketball (finding 1).")
+
+
+def test_forces_far_off_leave_the_motion_and_markers_far_off_nothing(record):
+    far = with_error(with_faults(record), BASKETBALL, rmse_percent_bw=7.25)
+    assert kinds_of(far) == ["full", "full", "motion"]
+    assert "Use only the motion: basketball (vertical force error 7.2 %)." in list(use_lines(far))
+    slipped = with_faults(far, fault("marker_shift", BASKETBALL))
+    assert "Use only the motion: basketball (after finding 2)." in list(use_lines(slipped))
+    moved = far.trials[2].kinematics.assign(marker_rms_m=0.0235)
+    lost = with_trial(far, BASKETBALL, kinematics=moved)
+    assert "Leave out: basketball (marker error 23.5 mm)." in list(use_lines(lost))
+    gone = with_trial(far, BASKETBALL, kinematics=None)
+    assert "Leave out: basketball (no motion was computed)." in list(use_lines(gone))
+
+
+def test_forces_that_were_not_compared_are_not_vouched_for(record):
+    unknown = with_trial(with_faults(record), BASKETBALL, fit=None)
+    said = "Use only the motion: basketball (forces could not be compared)."
+    assert said in list(use_lines(unknown))
+
+
+def test_what_quiet_stance_shows_concerns_all(record):
+    weight = fault("plate_gain", STATIC, class_id="W", verdict="ambiguous")
+    assert kinds_of(with_faults(record, weight)) == ["corrected"] * 3
+    said = list(use_lines(with_faults(record, weight)))
+    assert said == ["Use once corrected or stated: all recordings (finding 1)."]
+
+
+def test_without_a_diagnosis_nothing_is_said_of_the_recordings(record):
+    bare = replace(record, diagnosis=None, detection=None)
+    assert list(use_lines(bare)) == ["Whether the recordings may be used cannot be said."]
+
+
+def test_runs_are_counted_where_they_are_many(record):
+    runs = [
+        replace(record.trials[2], stem=f"sub-01_task-walking_run-{k}", task="walking")
+        for k in range(1, 6)
+    ]
+    many = with_faults(
+        replace(record, trials=(*record.trials, *runs)), fault("sync_offset", STATIC)
+    )
+    assert list(use_lines(many)) == [
+        "Use (motion, forces, joint moments): sequence, basketball and 5 × walking.",
+        "Use once corrected or stated: static (finding 1).",
+    ]
+    two = replace(many, trials=many.trials[:5])
+    assert "basketball, walking run 1 and walking run 2." in next(iter(use_lines(two)))
+
+
+# --- a large error is a finding -----------------------------------------------------------------
+
+
+def test_large_alone_is_in_the_title(record):
+    far = with_error(with_faults(record), SEQUENCE, rmse_percent_bw=9.0)
+    assert light_for(far).title == "Fine: no fault found, no large error but in sequence"
+    assert large_finding(far) == ()
+    *_, to_do = front(replace(far, refusals=()))
+    assert len(to_do.items) == 1 and to_do.items[0].startswith("In sequence look for feet or hands")
+    both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
+    assert light_for(both).title == "1 fault found; no large error but in sequence"
+
+
+def test_a_large_error_comes_first_and_counts(record):
+    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    (finding,) = large_finding(far)
+    assert finding == (
+        "Large error with OM (identified): vertical force 9.0 %, most in basketball; other "
+        "findings explain part at most."
+    )
+    (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
+    assert numbered.items[0] == finding and numbered.items[1].startswith("Plate 1 is turned")
+    *_, to_do = front(far)
+    assert to_do.items[0].startswith("Finding 1: In basketball look for")
+    assert to_do.items[1].startswith("Finding 2: Correct the forces")
+    assert [one.name for one, _ in beyond(far)] == [FORCE]
+    assert worst_of(far, beyond(far)[0][0]).stem == BASKETBALL
+
+
+def test_parameters_wait_for_the_recordings_that_they_are_from(record):
+    """And with a large error for any recording that may be used: here quiet stance may."""
+    fine = with_faults(record)
+    assert not must_wait(fine)
+    assert must_wait(with_faults(record, fault("sync_offset", SEQUENCE)))
+    assert not must_wait(with_faults(record, fault("sync_offset", BASKETBALL)))
+    table = replace(fine, choice=record.choice.assign(use="RM"))
+    far = table
+    for stem in TRIALS:
+        far = with_error(far, stem, rmse_percent_bw=9.0)
+    assert light_for(far).state == "large" and not must_wait(far)
+    assert must_wait(with_error(far, STATIC, rmse_percent_bw=9.0))
+
+
+def test_elsewhere_found_is_no_explanation(record):
+    far = with_error(
+        with_faults(record, TURNED.assign(trials=SEQUENCE)), BASKETBALL, rmse_percent_bw=9.0
+    )
+    assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
+
+
+def test_a_fault_that_makes_the_largest_part_is_named(record):
+    term = record.budget["term"].replace("inertial_parameters", "fault:plate_rotation")
+    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    known = replace(far, budget=far.budget.assign(term=term))
+    assert number_of_main_part(known) == 2
+    assert large_finding(known)[0].endswith("; the largest part is finding 2.")
+    *_, to_do = front(known)
+    assert to_do.items[0].startswith("Finding 2: Correct the forces")  # and no search for the cause
+    assert number_of_main_part(far) == 0
+
+
+def test_a_large_error_elsewhere_is_a_finding_of_its_own(record):
+    """The diagnosis speaks of the recording that is not the worst."""
+    error = fault("unexplained", SEQUENCE, target="", parameter="error").assign(
+        sentence="large error, cause unknown: 21 N of the vertical force remain unexplained"
+    )
+    far = with_error(with_faults(record, error), BASKETBALL, rmse_percent_bw=9.0)
+    assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
+    (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
+    assert [line[:5] for line in numbered.items] == ["Large", "21 N "]
+    there = with_faults(far, error.assign(trials=", ".join(TRIALS)))
+    assert large_finding(there) == ()
+    *_, to_do = front(there)
+    assert to_do.items[0].startswith("Finding 1: In basketball look for")
+
+
+def test_markers_far_off_are_no_matter_of_the_forces(record):
+    facts = record.facts.copy()
+    facts["marker_rms_m"] = 0.025
+    lost = replace(with_faults(record, TURNED), facts=facts)
+    assert large_finding(lost)[0].startswith(
+        "Large error with OM (identified): markers from model 25"
+    )
+    assert "explain" not in large_finding(lost)[0] and number_of_main_part(lost) == 0
+    *_, to_do = front(lost)
+    assert to_do.items[0].startswith("Finding 1: Check that marker set and labels are right")
+
+
+def test_the_terminal_numbers_findings_as_the_page_does(reports, tmp_path):
+    person = reports.study.participants[0]
+    artifacts = Artifacts(tmp_path, person)
+    artifacts.write_all()
+    for trial in person.trials[1:]:
+        fit = artifacts.fit(trial)
+        far = fit.assign(
+            rmse_percent_bw=fit["rmse_percent_bw"].where(fit["rmse_percent_bw"].isna(), 9)
+        )
+        artifacts.write("fit", far, trial)
+    replace(reports, out=tmp_path).run("report", person)
+    said = " ".join("\n".join(shown(tmp_path)).split())
+    assert " 1. Large error with OM (identified): vertical force 9.0 %" in said
+    assert " 2. Plate 1 is turned by +2.0 degrees" in said
+    full = " ".join("\n".join(shown(tmp_path, full=True)).split())
+    assert " 2. Plate 1 is turned" in full and "Findings 2 and 3: The measured forces" in full
+    page = replace(reports, out=tmp_path).html("sub-01")
+    assert page.count("Large error with OM (identified): vertical force") == 2  # and in the fold
+
+
+def test_numbers_of_advice_begin_where_the_findings_do():
+    causes = causes_of(candidates_of(FOUND))
+    assert consequences(causes)[0].startswith("Findings 1 and 2: ")
+    assert consequences(causes, first=2)[0].startswith("Findings 2 and 3: ")
+    assert consequences(causes[:1], first=2)[0].startswith("Finding 2: ")
+
+
+# --- findings in few words ----------------------------------------------------------------------
+
+
+def test_all_members_of_a_group_are_named():
+    group = FOUND[FOUND["class_id"] == "B"]
+    more = [
+        group[:1].assign(effect=effect, target=target, rank=20 + k, probability=0.01)
+        for k, (effect, target) in enumerate(
+            [("plate_drift", "1 fz"), ("plate_rotation", "1"), ("plate_rotation", "2")]
+        )
+    ]
+    (cause,) = causes_of(candidates_of(pd.concat([group, *more])))
+    line = cause_line(cause, TRIALS)
+    assert line.startswith(
+        "One of 5 causes that look alike here: channel fz has an offset of +9.8 N;"
+    )
+    for effect in ("added_mass", "plate_drift"):
+        assert effect_title(effect) in line
+    assert f"{effect_title('plate_rotation')} (2 places)" in line
+    assert line.endswith("Together 99.0 %.")
+
+
+def test_findings_without_room_are_named_with_their_numbers(record):
+    skin = {"class_id": "M1", "verdict": "ambiguous", "probability": 0.5}
+    many = with_faults(
+        record,
+        *(fault(effect, SEQUENCE) for effect in ("sync_offset", "plate_gain", "marker_shift")),
+        *(fault(effect, SEQUENCE, **skin) for effect in ("missing_joint", "soft_tissue")),
+        *(fault("soft_tissue", stem) for stem in TRIALS),
+    )
+    (links,) = (block for block in front(many) if isinstance(block, Links))
+    assert links.to == (("More below", "#wrong"),)
+    assert links.rest == (
+        f". 3: {effect_title('marker_shift')}; 4 to 6: {effect_title('missing_joint')} / "
+        f"{effect_title('soft_tissue')}."
+    )
+
+
+def test_a_fault_says_what_it_changes_at_the_joints(record):
+    peaks = all_peaks(record.trials)
+    causes = causes_of(candidates_of(TURNED))
+    assert moment_change(causes[0], causes, peaks) == (
+        "changes the left knee's moment by 9 % of its peak"
+    )
+    small = peaks.assign(change_percent=0.4)
+    assert moment_change(causes[0], causes, small) == "changes no joint moment by 1 %"
+    assert moment_change(causes[0], causes, pd.DataFrame()) == ""
+    other = causes_of(candidates_of(fault("sync_offset", SEQUENCE)))
+    assert moment_change(other[0], other, peaks) == ""
+
+
+def test_of_two_alike_in_one_recording_no_change_is_known(record):
+    both = pd.concat([TURNED, TURNED.assign(target="2", rank=9)])
+    causes = causes_of(candidates_of(both))
+    assert moment_change(causes[0], causes, all_peaks(record.trials)) == ""
+    apart = pd.concat([TURNED.assign(trials=SEQUENCE), TURNED.assign(trials=BASKETBALL, rank=9)])
+    causes = causes_of(candidates_of(apart))
+    assert "left knee" in moment_change(causes[0], causes, all_peaks(record.trials))
+
+
+@pytest.mark.parametrize(
+    ("own", "short", "full"),
+    [
+        ("", "share it.", "share it."),
+        (
+            ", and this person's recordings alone leave it open: 6 ms, 95 % interval -4 to 16 ms",
+            "share it (this person alone: 6 ms).",
+            "share it (this person alone: 6 ms, 95 % interval −4 to 16 ms).",
+        ),
+    ],
+)
+def test_of_two_sizes_it_is_said_with_which_to_correct(own, short, full):
+    said = f"plate 1 is turned; this is known from the laboratory (7 persons){own}"
+    (cause,) = causes_of(candidates_of(TURNED.assign(sentence=said)))
+    correct = "Correct with this size, as 7 persons of the laboratory "
+    assert cause_line(cause, TRIALS).endswith(f"probability 99.5 %. {correct}{short}")
+    assert cause_text(cause, TRIALS).endswith(f"{correct}{full}")
+    assert "known from" not in cause_line(cause, TRIALS) + cause_text(cause, TRIALS)
+
+
+def test_errors_by_other_parameters_stand_beside(record):
+    assert {one.name: size for one, size in measured_of(record, "RM")}[COP] > 0
+    scales = next(block for block in front(record) if hasattr(block, "scales")).scales
+    assert [bool(scale.other) for scale in scales] == [True, True, False]
+    table = replace(record, choice=record.choice.assign(use="RM"))
+    scales = next(block for block in front(table) if hasattr(block, "scales")).scales
+    assert not any(scale.other for scale in scales)
+    assert np.isfinite({one.name: size for one, size in measured_of(record)}[MARKERS])

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, GateLimits
-from bsip_cli.recordings.plate_reading import AS_STATED, PlateReading
+from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_source import Opened, later_samples
 from bsip_cli.recordings.scene import by_segment
 from bsip_cli.recordings.written import OTHER_RATE, PACES
@@ -67,15 +67,13 @@ class Lags:
         return float(self.seconds[best] + aside * (self.seconds[best + 1] - self.seconds[best]))
 
 
-def lags(
-    opened: Opened, limits: GateLimits = USUAL, reading: PlateReading = AS_STATED
-) -> Lags | None:
-    """Of a trial, its plates all read alike but for their signs; None where nothing shows it."""
+def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
+    """Of a trial, its plates as the file says but for their signs; None where nothing shows it."""
     rate_hz = opened.recording.marker_rate_hz
     step = max(1, round(_STEP_S * rate_hz))
     if step / rate_hz > LEAST_S or not opened.sources:
         return None
-    body, samples, wrenches = motion_and_forces(opened, step, reading)
+    body, samples, wrenches = motion_and_forces(opened, step)
     if not np.isfinite(body.rate).any():
         return None
     total = np.zeros((len(body.rate), 6))
@@ -94,11 +92,9 @@ def lags(
     return Lags(seconds, *np.array(list(found.values())).T)
 
 
-def motion_and_forces(
-    opened: Opened, step: int, reading: PlateReading = AS_STATED
-) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
+def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
     """The body at every ``step``-th of the frames; the samples (n,) of the same times, fewer where
-    the plates end before the markers; and each plate's wrench there by the reading, (n, 6),
+    the plates end before the markers; and each plate's wrench there as the file says, (n, 6),
     averaged as the body is."""
     recording = opened.recording
     rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
@@ -108,7 +104,7 @@ def motion_and_forces(
     wrenches = {}
     for source in opened.sources:
         parts = source.smoothed(SMOOTH_S * analog_hz).at(samples).parts()
-        wrenches[source.name] = parts @ source.matrix(reading).T
+        wrenches[source.name] = parts @ source.matrix(AS_STATED).T
     body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
     return body, samples, wrenches
 

@@ -11,13 +11,7 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Body, GateLimits
 from bsip_cli.recordings.clock import lags, motion_and_forces
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.plate_reading import (
-    AS_STATED,
-    FORCES_MOVED,
-    MIRRORS,
-    FrameChange,
-    PlateReading,
-)
+from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N, repeated_plates
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
@@ -109,37 +103,17 @@ class TrialSamples:
 
 
 def _delay_s(opened: Opened, hands: Handedness, limits: GateLimits) -> float:
-    """Of the forces after the body; in other axes, units or reference points where none makes them
-    go together as stated, and by the lift where these do not either."""
+    """Of the forces after the body; in other axes where none makes them go together as stated, and
+    by the lift where these do not either."""
     best = lags(opened, limits)
     if best is None:
         return 0.0
     if best.log_likelihood.max() <= 0.0:
-        changes = MIRRORS if hands.is_mirrored else FORCES_MOVED
-        others = [(opened.in_frame(change), AS_STATED) for change in changes]
-        others += [(opened, reading) for reading in _of_all_plates(opened)]
-        for one in (lags(each, limits, reading) for each, reading in others):
+        for change in MIRRORS if hands.is_mirrored else FORCES_MOVED:
+            one = lags(opened.in_frame(change), limits)
             if one is not None and one.log_likelihood.max() > best.log_likelihood.max():
                 best = one
     return best.delay_s(limits)
-
-
-def _of_all_plates(opened: Opened) -> set[PlateReading]:
-    """Units and reference points that may be those of all plates."""
-    each = [
-        {
-            replace(
-                AS_STATED,
-                moment_scale=one.moment_scale,
-                point_scale=one.point_scale,
-                about=one.about,
-            )
-            for one in source.alternatives()
-            if one.about != "fixed"
-        }
-        for source in opened.sources
-    ]
-    return set.intersection(*each) - {AS_STATED}
 
 
 def _mass_kg(opened: Opened) -> float:

@@ -34,7 +34,7 @@ def test_the_long_suite_holds_enough_of_everything():
     effects = Counter(case.hidden[0].effect for case in cases if case.kind == "single")
     assert effects == dict.fromkeys(EFFECTS, 10)
     kinds = Counter(case.kind for case in cases)
-    assert kinds == {"single": 250, "null": 40, "double": 20, "outside": 32}  # two of each
+    assert kinds == {"single": 260, "null": 40, "double": 20, "outside": 32}  # two of each
     assert {c.hidden[0].effect for c in cases if c.kind == "outside"} == set(OUTSIDE)
     assert all(len(case.hidden) == 2 for case in cases if case.kind == "double")
     assert len({case.name for case in cases}) == len(cases)
@@ -154,6 +154,6 @@ def test_an_interrupted_suite_goes_on_and_writes_its_tables(tmp_path, monkeypatc
     after = {path: path.stat().st_mtime_ns for path in results.rglob("*.json")}
     assert kept.items() <= after.items()
     assert len(after) == 1 + len(cases_of(sessions))  # and the settings
-    assert "\na whole session,47,0," in (tables / "blind_false_positives.csv").read_text()
+    assert "\na whole session,48,0," in (tables / "blind_false_positives.csv").read_text()
     with pytest.raises(SystemExit, match="another --results"):
         blind_long.main([*arguments[:-1], "3"])

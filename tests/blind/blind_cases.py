@@ -81,7 +81,7 @@ PAIRS = ("RWRR+RWRU", "LWRR+LWRU", "RKNEL+RKNEM", "LMALL+LMALM", "RMALL+RMALM")
 CATALOGUE: dict[str, Range] = {
     "sync_offset": Range(0.005, 0.02, ("-",), (SESSION, "squat", SESSION, "hops"), True),
     "clock_drift": Range(2e-4, 5e-4, ("-",), (SESSION,), True),
-    "frame_rate": Range(0.1, 0.25, ("-",), (SESSION,), True),
+    "frame_rate": Range(0.05, 0.12, ("-",), (SESSION,), True),  # more, ingest sees
     "plate_translation": Range(0.01, 0.03, ("-",), (SESSION, "squat")),
     "plate_rotation": Range(0.0175, 0.07, ("yaw",), (SESSION, "squat"), True),
     "plate_gain": Range(0.02, 0.05, ("fz",), (SESSION, "stepon", SESSION, "hops"), True),

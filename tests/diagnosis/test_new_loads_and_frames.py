@@ -19,7 +19,7 @@ HIDDEN = [  # the number that is named, what it is within, and the person's seed
     ("external_force", 40.0, "lower_torso", "force", (32.0, 50.0), 701),
     ("object_handled", 1.0, "hand_l", "mass", (0.8, 1.25), 701),
     ("marker_slide", 0.03, "LKNEL", "way", (0.024, 0.0375), 641),
-    ("frame_rate", -0.1667, "-", "rate_ratio", (0.81, 0.86), 701),
+    ("frame_rate", -0.08, "-", "rate_ratio", (0.90, 0.94), 701),
     ("frame_rate", 0.25, "-", "rate_ratio", (1.22, 1.28), 641),
 ]
 

@@ -6,7 +6,7 @@ import errno
 import random
 import shutil
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -96,8 +96,13 @@ def _failing(call: Call, chance: random.Random) -> Call:
 def what_fails(bench: Bench, library: Path, out: Path, call: Call) -> list[str]:
     """What did not hold when this call failed."""
     done, lines = run_with(bench, library, bench.fresh_out(out), call)
-    if len(lines) < call.number:
-        return [f"only {len(lines)} calls were made"]
+    if len(lines) < call.number:  # caches of libraries spare some: where is the same call now?
+        same = [n for n, line in enumerate(lines, 1) if line.split() == [call.name, call.file]]
+        if same:
+            call = replace(call, number=same[-1])
+            done, lines = run_with(bench, library, bench.fresh_out(out), call)
+        if len(lines) < call.number:
+            return [f"only {len(lines)} calls were made"]
     is_named = any(word in done.said for word in (str(out), str(bench.study), "sub-01"))
     return [
         *([f"exit code {done.code}: {done.said}"] if done.code not in CODES else []),

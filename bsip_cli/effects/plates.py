@@ -371,7 +371,7 @@ class FrameRate(Effect):
     is_of_laboratory = True
     numbers = (Parameter("faster", "1", -0.6, 1.5, 0.1),)
     looks = "forces that are smaller or larger than the movement needs, the more, the faster it is"
-    remedy = "let a marker fall: 1.2 m take half a second"
+    remedy = "let a marker fall: 1.2 m takes half a second"
     least_named = MappingProxyType({"faster": 0.04})  # rates in use differ more: 240 and 250 Hz
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -212,8 +212,10 @@ def rewrite_c3d(
     kept = before.frames(first, first + len(after.points_m))
     _put_points(c3d, columns, kept, after)
     _put_forces(c3d, wired, kept, after)
-    for group in ("POINT", "ANALOG"):
-        c3d["parameters"][group]["RATE"]["value"] *= after.marker_hz / before.marker_hz
+    if after.marker_hz != before.marker_hz:
+        for group in ("POINT", "ANALOG"):
+            rate = c3d["parameters"][group]["RATE"]
+            rate["value"] = np.array(rate["value"], float) * after.marker_hz / before.marker_hz
     if said:
         lines = [part for line in said for part in wrap(line, _LINE)]
         c3d.add_parameter("BSIP", "CORRECTED", lines)

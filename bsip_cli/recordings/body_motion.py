@@ -33,6 +33,7 @@ _FEWEST_FRAMES = 10
 _ROUNDS = 5  # of weights that follow the residuals
 FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
+_SAME = 1.0 - 1e-9  # correlation: of no noise
 _ALIKE = 0.15  # logarithm of force over motion: its scatter over sound recordings, see above
 _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
 # Those whose sizes are compared, and the usual one, logarithm: the spin of the segments about their
@@ -134,13 +135,15 @@ class Balance:
     gaps_m : of each trial, of the centre of mass from over the centre of pressure, movement taken
     off, RMS; without trials in which nothing is known. correlations : of force with motion, by
     kind; numbers : how many independent ones they are of. sizes : of force over motion, logarithm,
-    above the usual one, each with their correlation.
+    above the usual one, each with their correlation. turned : correlation of level forces that are
+    turned or mirrored as suits them best.
     """
 
     gaps_m: tuple[float, ...] = ()
     correlations: Mapping[str, float] | None = None
     numbers: float = 0.0
     sizes: tuple[tuple[float, float], ...] = ()
+    turned: float = 0.0
 
     @classmethod
     def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> Balance:
@@ -158,6 +161,9 @@ class Balance:
         force2 = some.about_means(force, force) + some.noise
         motion2 = some.about_means(motion, motion) + some.noise
 
+        across, wanted = (one[:, :2] @ [[1.0], [1j]] for one in (force, motion))
+        turned = max(abs(some.about_means(across, x)[0]) for x in (wanted, wanted.conj()))
+
         def correlation(k: list[int]) -> float:
             return float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
 
@@ -169,6 +175,7 @@ class Balance:
                 (0.5 * float(np.log(force2[k].sum() / motion2[k].sum())) - usual, correlation(k))
                 for k, usual in _SIZES.values()
             ),
+            float(turned / np.sqrt(force2[:2].sum() * motion2[:2].sum())),
         )
 
     def log_likelihood(self, limits: GateLimits) -> float:
@@ -189,10 +196,16 @@ class Balance:
 
     def lift_log_likelihood(self) -> float:
         """The same of the vertical force alone."""
-        return float(sum(self._rising([alike for _, alike in self.sizes[_LIFT : _LIFT + 1]])))
+        return float(
+            sum(self._rising([alike for _, alike in self.sizes[_LIFT : _LIFT + 1]], _SAME))
+        )
 
-    def _rising(self, correlations: Sequence[float]) -> np.ndarray:
-        close = np.clip(correlations, -_CLOSEST, _CLOSEST)
+    def level_log_likelihood(self) -> float:
+        """The same of level forces in whatever axes."""
+        return 2.0 * float(self._rising([self.turned], _SAME)[0])
+
+    def _rising(self, correlations: Sequence[float], closest: float = _CLOSEST) -> np.ndarray:
+        close = np.clip(correlations, -closest, closest)
         return np.asarray(-0.5 * self.numbers * np.sign(close) * np.log(1.0 - close**2))
 
     def size_log_likelihood(self, times: float = 1.0) -> float:

@@ -8,15 +8,16 @@ and a hidden delay of 0.3 s was found to 0.04 s.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import find_peaks
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, GateLimits
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import Opened, later_samples
+from bsip_cli.recordings.plate_source import Opened, later_samples, repeated_plates
 from bsip_cli.recordings.scene import by_segment
 from bsip_cli.recordings.written import OTHER_RATE, PACES
 
@@ -32,39 +33,73 @@ _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
 _NEAR_S = 0.1  # lags so near are one
 
 
+@dataclass(frozen=True)
+class Delay:
+    """Of the forces after the body; ``kept`` : the part of the trial that then has both;
+    ``log_posterior`` : how rare it is, and how well lift and body then go together."""
+
+    seconds: float = 0.0
+    kept: float = 1.0
+    log_posterior: float = 0.0
+
+    def limits(self, usual: GateLimits) -> GateLimits:
+        """A part of a trial counts as so many independent numbers less."""
+        return replace(usual, independent_numbers=self.kept * usual.independent_numbers)
+
+
+NO_DELAY = Delay()
+
+
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How well forces go with the body if they are taken from later, logarithm, (n,) each; of the
-    lift alone, how corners, axes and moments are read does not matter."""
+    """How well forces go with the body if they are taken from later, logarithm, (n,) each: as the
+    file says; the force alone, turned or mirrored as suits it best; and the lift alone, which no
+    unit, reference point or order of corners changes. kept : see `Delay`."""
 
     seconds: np.ndarray
-    log_likelihood: np.ndarray
+    kept: np.ndarray
+    as_stated: np.ndarray
+    of_force: np.ndarray
     of_lift: np.ndarray
 
-    def delay_s(self, limits: GateLimits) -> float:
-        """Of the forces after the body, 0 where that is not sure or as small as others find; by the
-        lift where the whole is no better."""
-        is_large = np.abs(self.seconds) > LEAST_S
-        if self.log_likelihood.max() < self.of_lift.max():
-            # What carries and drives the body is still to confirm it: no prior is taken off twice.
-            return self._peak_s(self.of_lift, is_large, 0.0, limits)
-        rarely = DELAYED - float(np.log(len(self.seconds)))
-        return self._peak_s(self.log_likelihood, is_large, rarely, limits)
+    def delays(self, limits: GateLimits = USUAL) -> list[Delay]:
+        """None, and all that are not surely others if any surely is better: who moves in cycles
+        goes nearly as well with the forces of another one, and only the right reading of the plates
+        shows which it is."""
+        none = Delay(log_posterior=self.of_lift[len(self.seconds) // 2])
+        surely = -float(np.log(1 - limits.corrected_percent / 100))
+        every = np.array([self.as_stated, self.of_force, self.of_lift])
+        highest = every.max(axis=1)
+        nearly_none = every[:, np.abs(self.seconds) <= LEAST_S].max(axis=1).clip(min=0.0)
+        if not (highest > nearly_none + surely).any():
+            return [none]
+        least = (highest - surely).clip(min=surely)[:, None]
+        may_be, likelier = (every >= least).any(axis=0), every[:2].max(axis=0)
+        found = [none]
+        for k in find_peaks(likelier)[0]:
+            before, here, after = likelier[k - 1 : k + 2]  # of a parabola
+            bend = 2.0 * here - before - after
+            aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
+            delay_s = float(self.seconds[k] + aside * (self.seconds[k + 1] - self.seconds[k]))
+            if may_be[k] and abs(delay_s) > LEAST_S:
+                found.append(Delay(delay_s, self.kept[k], _log_prior(delay_s) + self.of_lift[k]))
+        return found
 
-    def _peak_s(
-        self, log_likelihood: np.ndarray, is_large: np.ndarray, rarely: float, limits: GateLimits
-    ) -> float:
-        best = int(np.argmax(log_likelihood))
-        logs = log_likelihood + is_large * rarely
-        near = is_large & (np.abs(self.seconds - self.seconds[best]) <= _NEAR_S)
-        surely = np.exp(logsumexp(logs[near]) - logsumexp([*logs, 0.0]))
-        is_inside = 0 < best < len(self.seconds) - 1
-        if not (is_large[best] and is_inside and surely >= limits.corrected_percent / 100):
-            return 0.0
-        before, here, after = log_likelihood[best - 1 : best + 2]  # of a parabola
-        bend = 2.0 * here - before - after
-        aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
-        return float(self.seconds[best] + aside * (self.seconds[best + 1] - self.seconds[best]))
+
+def _log_prior(delay_s: float) -> float:
+    """Of one step of lags there: tenths of a second are as frequent as whole ones."""
+    both_ways = 2 * float(np.log(_MOST_S / LEAST_S))
+    return DELAYED + float(np.log(_STEP_S / abs(delay_s) / both_ways))
+
+
+def surest(logs: Mapping[Delay, float], of_none: float, limits: GateLimits) -> Delay | None:
+    """The likeliest by logarithms of posteriors, if it or one near it surely is right."""
+    if not logs:
+        return None
+    best = max(logs, key=logs.__getitem__)
+    near = [log for one, log in logs.items() if abs(one.seconds - best.seconds) <= _NEAR_S]
+    surely = np.exp(logsumexp(near) - logsumexp([of_none, *logs.values()]))
+    return best if surely >= limits.corrected_percent / 100 else None
 
 
 def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
@@ -78,40 +113,42 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
         return None
     total = np.zeros((len(body.rate), 6))
     total[len(samples) :] = np.nan
-    for source in opened.sources:
-        pushing = wrenches[source.name]
-        pushing[~source.usable[samples]] = np.nan
+    usable = {source.name: source.usable[samples] for source in opened.sources}
+    for name, pushing in wrenches.items():
+        pushing[~usable[name]] = np.nan
         total[: len(samples)] += pushing if np.nansum(pushing[:, 2]) >= 0 else -pushing
-    most, near = (round(seconds * rate_hz / step) for seconds in (_MOST_S, 2 * _NEAR_S))
-    most = min(most, len(total))
-    rough = {k: _goes(body, total, k, limits) for k in range(-2 * (most // 2), most + 1, 2)}
-    peaks = [0, *(max(rough, key=lambda k: rough[k][which]) for which in (0, 1))]
-    fine = {k for peak in peaks for k in range(peak - near, peak + near + 1)} - rough.keys()
-    found = dict(sorted({**rough, **{k: _goes(body, total, k, limits) for k in fine}}.items()))
-    seconds = np.array(list(found)) * step / rate_hz
-    return Lags(seconds, *np.array(list(found.values())).T)
+    most = min(round(_MOST_S * rate_hz / step), len(total))
+    by = np.arange(-most, most + 1)
+    kept = 1.0 - np.abs(by) / len(total)
+    found = [_goes(body, total, k, limits) for k in by.tolist()]
+    return Lags(by * step / rate_hz, kept, *np.array(found).T)
 
 
 def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
     """The body at every ``step``-th of the frames; the samples (n,) of the same times, fewer where
     the plates end before the markers; and each plate's wrench there as the file says, (n, 6),
-    averaged as the body is."""
+    averaged as the body is, without plates that repeat others."""
     recording = opened.recording
     rate_hz, analog_hz = recording.marker_rate_hz, recording.analog_rate_hz
     frames = np.arange(0, recording.n_frames, step)
     samples = np.round(frames * analog_hz / rate_hz).astype(int)
     samples = samples[samples < min(len(source.usable) for source in opened.sources)]
     wrenches = {}
+    repeated = repeated_plates([{one.name: one for one in opened.sources}])
     for source in opened.sources:
+        if source.name in repeated:
+            continue
         parts = source.smoothed(SMOOTH_S * analog_hz).at(samples).parts()
         wrenches[source.name] = parts @ source.matrix(AS_STATED).T
     body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
     return body, samples, wrenches
 
 
-def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, float]:
-    balance = Balance.of(body, _shifted(total, by), limits)
-    return balance.log_likelihood(limits), balance.lift_log_likelihood()
+def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, ...]:
+    part = Delay(kept=1.0 - abs(by) / len(total)).limits(limits)
+    balance = Balance.of(body, _shifted(total, by), part)
+    lift, level = balance.lift_log_likelihood(), balance.level_log_likelihood()
+    return lift + balance.log_likelihood(part), lift + level, lift
 
 
 def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:

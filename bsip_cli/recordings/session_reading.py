@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import DELAYED, log_odds_of
+from bsip_cli.recordings.clock import log_odds_of, surest
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis, PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import repeated_plates
@@ -90,10 +90,6 @@ class SessionReading:
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
 
-    def with_delays(self) -> float:
-        """Logarithm of the posterior, but for a constant, rare delays counted."""
-        return self.log_posterior + DELAYED * len(self.delays_s)
-
 
 def reading_of_files(
     trials: Sequence[TrialSamples],
@@ -113,7 +109,7 @@ def reading_of_files(
     if of_others := {trials[k].name: trials[other].name for k, other in whose.items()}:
 
         def own(written: Written = AS_WRITTEN) -> list[TrialSamples]:
-            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": None}
+            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": ()}
             return [
                 replace(one.without(one.sources), **nothing) if one.name in of_others else one
                 for one in read(written)
@@ -129,12 +125,12 @@ def reading_of_files(
             written = Written(FORCE_UNITS_N[name])
             trials = read(written)
     found, surely = session_reading(trials, limits), limits.corrected_percent / 100
-    now, best = found.with_delays(), replace(found, written=written)
+    now, best = found.log_posterior, replace(found, written=written)
     most = float(np.log(surely / (1 - surely)))
     for pace, odds in likely_paces([one.lengths for one in trials]).items():
         other = replace(written, pace=pace)
         found = session_reading(read(other), limits)
-        if (gain := found.with_delays() + odds - now) > most:
+        if (gain := found.log_posterior + odds - now) > most:
             best, most = replace(found, written=other), gain
     if (pace := best.written.pace) == 1.0:
         return best
@@ -151,15 +147,15 @@ def reading_of_files(
 def session_reading(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
     """The axes and the plates' readings that make a person of a session, and the delays of single
     trials: what either may explain, the likelier does."""
-    surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
     best = _reading(trials, limits)
     for k, trial in enumerate(trials):
-        if trial.late is not None:
-            others = [*trials[:k], trial.late, *trials[k + 1 :]]
-            other = _reading(others, limits)
-            if other.log_posterior + DELAYED - best.log_posterior > surely:
-                trials, best = others, other
-    delays = {trial.name: trial.delay_s for trial in trials if trial.delay_s}
+        late = {one.delay: [*trials[:k], one, *trials[k + 1 :]] for one in trial.late}
+        found = {delay: _reading(some, delay.limits(limits)) for delay, some in late.items()}
+        logs = {delay: one.log_posterior for delay, one in found.items()}
+        if (delay := surest(logs, best.log_posterior, limits)) is not None:
+            trials = late[delay]
+            best = _reading(trials, limits)
+    delays = {trial.name: trial.delay.seconds for trial in trials if trial.delay.seconds}
     return replace(best, delays_s=delays)
 
 
@@ -181,7 +177,7 @@ def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
         verdicts | repeated,
         paces=chosen.of.paces(limits.corrected_percent),
         maybe_paces=chosen.of.paces(100 - limits.believed_percent),
-        log_posterior=chosen.of.log_posterior,
+        log_posterior=chosen.of.log_posterior + sum(one.delay.log_posterior for one in trials),
         of_paces=tuple(one.tolist() for one in chosen.of.of_paces.values()),
     )
 

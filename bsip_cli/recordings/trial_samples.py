@@ -9,10 +9,10 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Body, GateLimits
-from bsip_cli.recordings.clock import lags, motion_and_forces
+from bsip_cli.recordings.clock import NO_DELAY, Delay, lags, motion_and_forces
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange
-from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N, repeated_plates
+from bsip_cli.recordings.plate_reading import FrameChange
+from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
 from bsip_cli.recordings.under_the_feet import Feet
@@ -28,8 +28,8 @@ class TrialSamples:
 
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
-    text file carry if they are in N, 0 where that is not known. ``late`` : the same with the forces
-    of ``delay_s`` later, if these go with the motion far better; None else.
+    text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
+    another ``delay``, of each that may be.
     """
 
     name: str
@@ -44,17 +44,21 @@ class TrialSamples:
     body: Body
     lengths: Lengths | None = None
     mass_kg: float = 0.0
-    delay_s: float = 0.0
-    late: TrialSamples | None = None
+    delay: Delay = NO_DELAY
+    late: tuple[TrialSamples, ...] = ()
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
-        delay_s = _delay_s(opened, stated.hands, limits) if stated.sources else 0.0
-        if not delay_s:
+        found = lags(opened, limits) if stated.sources else None
+        if found is None:
             return stated
-        late = cls._of(opened.with_forces_from(delay_s))
-        return replace(stated, late=replace(late, delay_s=delay_s))
+        none, *others = found.delays(limits)
+        late = (
+            replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
+            for delay in others
+        )
+        return replace(stated, delay=none, late=tuple(one for one in late if one.sources))
 
     @classmethod
     def _of(cls, opened: Opened) -> TrialSamples:
@@ -102,31 +106,15 @@ class TrialSamples:
         return changed
 
 
-def _delay_s(opened: Opened, hands: Handedness, limits: GateLimits) -> float:
-    """Of the forces after the body; in other axes where none makes them go together as stated, and
-    by the lift where these do not either."""
-    best = lags(opened, limits)
-    if best is None:
-        return 0.0
-    if best.log_likelihood.max() <= 0.0:
-        for change in MIRRORS if hands.is_mirrored else FORCES_MOVED:
-            one = lags(opened.in_frame(change), limits)
-            if one is not None and one.log_likelihood.max() > best.log_likelihood.max():
-                best = one
-    return best.delay_s(limits)
-
-
 def _mass_kg(opened: Opened) -> float:
     """What nearly all of the force over the acceleration that it carries comes to at most."""
     if opened.lengths is None or not opened.sources:
         return 0.0
     step = max(1, round(SMOOTH_S * opened.recording.marker_rate_hz))
     body, samples, wrenches = motion_and_forces(opened, step)
-    repeated = repeated_plates([{one.name: one for one in opened.sources}])
     size = np.zeros(len(samples))
-    for name, wrench in wrenches.items():
-        if name not in repeated:
-            size += np.linalg.norm(wrench[:, :3], axis=1)
+    for wrench in wrenches.values():
+        size += np.linalg.norm(wrench[:, :3], axis=1)
     needed = GRAVITY_M_S2 + body.rate[: len(samples), 2]
     carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
     loaded = carried[carried > _LOADED * carried.max(initial=0.0)]

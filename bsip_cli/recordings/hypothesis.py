@@ -247,16 +247,15 @@ class Hypothesis:
         return self._log_prior() + on_feet + self.balance.log_likelihood(self.limits)
 
     def _log_prior(self) -> float:
-        """How rare it is that so much is wrong at once, logarithm."""
+        """How rare it is that so much is wrong at once, logarithm; what is wrong with several
+        plates alike is one fault, whatever else is wrong with one of them."""
         readings = [fit.reading for fit in self.fits.values()]
-        repairs: dict[PlateReading, int] = {}
-        for reading in readings:
-            repair = replace(reading, centre_m=None, place_of="", sign=1)
-            repairs[repair] = repairs.get(repair, 0) + 1
-        alone = sum(n < len(readings) for repair, n in repairs.items() if repair != AS_STATED)
+        each = [reading.repairs() for reading in readings]
+        repairs = {what: rare for one in each for what, rare in one.items()}
+        alone = sum(not all(what in one for one in each) for what in repairs)
         return (
             self.frame.log_prior()
-            + sum(repair.log_prior() for repair in repairs)
+            + sum(repairs.values())
             + ONE_ALONE * alone
             + EXCHANGED * sum(bool(reading.place_of) for reading in readings) / 2
             + REVERSED * any(reading.sign < 0 for reading in readings)
@@ -298,13 +297,17 @@ class Hypothesis:
             fits = plate_fits(self.trials, name, asked) if asked else []
             for repair, fit in zip(repairs, fits, strict=True):
                 possible.setdefault(repair, {})[name] = fit
-        for repair, some in possible.items():
-            if repair != AS_STATED:
+        for repair, every in possible.items():
+            some = {name: fit for name, fit in every.items() if self._is_other(name, fit)}
+            if repair != AS_STATED and some:
                 yield self._with(some)
                 yield from (self._with({name: fit}) for name, fit in some.items() if len(some) > 1)
         for pair in combinations(self.fits, 2):
             if all(name in trial.sources for trial in self.trials for name in pair):
                 yield self._with({a: self._in_place_of(a, b) for a, b in (pair, pair[::-1])})
+
+    def _is_other(self, name: str, fit: PlateFit) -> bool:
+        return fit.reading != self.fits[name].reading
 
     def _with(self, fits: Mapping[str, PlateFit]) -> Hypothesis:
         return Hypothesis(self.frame, self.trials, self.body, {**self.fits, **fits}, self.limits)

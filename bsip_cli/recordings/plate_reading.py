@@ -64,18 +64,22 @@ class PlateReading:
     channels: str = ""
     half_size_m: tuple[float, float] | None = None
 
-    def log_prior(self) -> float:
-        """How rare the repairs are together, natural logarithm, 0 without any."""
-        scaled = (abs(self.moment_scale) != 1.0) + (self.point_scale != 1.0)
-        return (
-            _SCALED * scaled
-            + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.channels))
-            + _BOTH_REVERSED * (self.channels.startswith("reversed") and " and " in self.channels)
-            + _TWO_OF_SENSORS * any(n in CHANNELS_OF[3] for n in self.channels.split())
-            + _OTHER_POINT * (self.about != "stated")
-            + TURNED * (self.turn != 0 and not self.mirrored)
-            + MIRRORED * self.mirrored
-        )
+    def repairs(self) -> dict[tuple, float]:
+        """Each, by what it is, and how rare it is, natural logarithm."""
+        both = self.channels.startswith("reversed") and " and " in self.channels
+        sensors = any(name in CHANNELS_OF[3] for name in self.channels.split())
+        of_channels = _MOMENTS_REVERSED + _BOTH_REVERSED * both + _TWO_OF_SENSORS * sensors
+        each = {
+            ("moments", abs(self.moment_scale)): _SCALED * (abs(self.moment_scale) != 1.0),
+            ("points", self.point_scale): _SCALED * (self.point_scale != 1.0),
+            ("signs", self.moment_scale < 0): _MOMENTS_REVERSED * (self.moment_scale < 0),
+            ("channels", self.channels): of_channels * bool(self.channels),
+            ("about", self.about): _OTHER_POINT * (self.about != "stated"),
+            ("corners", self.turn, self.mirrored): (
+                MIRRORED if self.mirrored else TURNED * (self.turn != 0)
+            ),
+        }
+        return {what: rare for what, rare in each.items() if rare}
 
     def channel_matrix(self, names: Sequence[str] = CHANNELS) -> np.ndarray:
         """To what the channels of these names are from what is written as such, (k, k)."""

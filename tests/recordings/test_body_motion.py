@@ -61,6 +61,19 @@ def test_other_axes_change_nothing(body):
     assert one.correlations == pytest.approx(other.correlations)
 
 
+@pytest.mark.parametrize(
+    "change", [np.diag([1.0, -1.0, 1.0]), np.diag([-1.0, -1.0, 1.0]), np.eye(3)[[1, 0, 2]]]
+)
+def test_the_force_alone_goes_with_the_body_in_whatever_axes(body, change):
+    """And whatever its moments are."""
+    wrench = _wrench(body)
+    one = Balance.of(body, wrench, USUAL)
+    other = Balance.of(body, np.hstack([wrench[:, :3] @ change.T, 0.0 * wrench[:, 3:]]), USUAL)
+    assert other.level_log_likelihood() == pytest.approx(one.level_log_likelihood(), rel=1e-3)
+    assert one.level_log_likelihood() > 10.0
+    assert other.drive_log_likelihood() < 0.5 * one.drive_log_likelihood()
+
+
 def test_a_body_of_which_little_is_seen_says_nothing():
     little = Body.of({"foot_l": _markers()["lower_torso"]}, RATE_HZ, FRAMES)
     found = Balance.of(little, np.ones((N, 6)), USUAL)

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.clock import lags
+from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.recordings.clock import Delay, Lags, lags, surest
 from bsip_cli.recordings.plate_reading import FrameChange
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import assemble, open_recording
@@ -84,6 +85,63 @@ def test_a_delay_is_found_in_forces_of_a_mirrored_frame(axis):
     session = session_of(late)
     assert list(session.delays_s.values()) == [pytest.approx(0.6, abs=0.03)]
     assert session.frame == FrameChange("forces", axis)
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (of_table, {"about": "origin"}),
+        (of_table, {"moment_scale": 1e3}),
+        (of_c3d, {"turn": 1}),
+        (of_c3d, {"moment_scale": 1e-3}),
+    ],
+)
+@pytest.mark.parametrize("delay_s", [-0.5, 0.8])
+def test_a_delay_is_found_in_forces_whose_moments_or_axes_are_wrong_too(make, fault, delay_s):
+    wrong = opened(make(**fault))
+    late = session_of(wrong.with_forces_from(-delay_s))
+    assert list(late.delays_s.values()) == [pytest.approx(delay_s, abs=0.03)]
+    assert [one.reading.words() for one in late.plates.values()] == [
+        one.reading.words() for one in session_of(wrong).plates.values()
+    ]
+
+
+def of_lags(**peaks: dict[float, float]) -> Lags:
+    """Narrow peaks, by their seconds, of each likelihood."""
+    seconds = np.round(np.arange(-2.0, 2.001, 0.02), 2)
+    found = {
+        name: sum(
+            (high * np.exp(-(((seconds - at) / 0.04) ** 2)) for at, high in highs.items()),
+            np.zeros_like(seconds),
+        )
+        for name, highs in ({"as_stated": {}, "of_force": {}, "of_lift": {}} | peaks).items()
+    }
+    return Lags(seconds, 1.0 - np.abs(seconds) / 4.0, **found)
+
+
+def test_each_cycle_of_a_motion_may_be_the_right_one():
+    cycles = {-0.85: 9.0, 0.35: 10.0, 1.55: 3.0}
+    none, *late = of_lags(of_force=cycles, of_lift=cycles).delays()
+    assert none.seconds == 0.0
+    assert [one.seconds for one in late] == [pytest.approx(x, abs=0.005) for x in (-0.85, 0.35)]
+    near, far = (next(x for x in late if (x.seconds > 0) == ahead) for ahead in (True, False))
+    rarer = np.log(0.85 / 0.35)
+    assert near.log_posterior - far.log_posterior == pytest.approx(1.0 + rarer, abs=0.1)
+    assert near.kept > far.kept
+
+
+def test_no_delay_is_tried_where_none_suits_as_well():
+    assert len(of_lags(of_force={0.0: 9.0, 0.5: 10.0}).delays()) == 1
+    assert len(of_lags(of_force={0.5: 2.0}).delays()) == 1
+    assert len(of_lags(as_stated={0.5: 9.0}, of_lift={0.0: 9.0}).delays()) == 2
+
+
+def test_the_likeliest_delay_is_taken_if_it_or_one_near_it_is_sure():
+    one, near, other = (Delay(seconds) for seconds in (0.3, 0.32, 1.1))
+    assert surest({}, 0.0, USUAL) is None
+    assert surest({one: 9.0, near: 8.5, other: 2.0}, 0.0, USUAL) == one
+    assert surest({one: 9.0, other: 8.5}, 0.0, USUAL) is None
+    assert surest({one: 9.0}, 8.5, USUAL) is None
 
 
 def test_only_the_trial_that_is_late_is_moved():

@@ -10,9 +10,10 @@ import pytest
 
 from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.recordings.hypothesis import Hypothesis
 from bsip_cli.recordings.plate_of_c3d import C3dPlate
 from bsip_cli.recordings.plate_of_table import ForceOnPoint
-from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
+from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
@@ -65,6 +66,16 @@ def of_sensors(one: str = "", other: str = "") -> list[C3dPlate]:
             channels[:, [i, j]] = channels[:, [j, i]]
         sources.append(replace(plate, description=stated, measured=channels))
     return sources
+
+
+def of_sensors_whose_moments_are_reversed() -> list[C3dPlate]:
+    """As where software wrote the eight channels."""
+    sources = of_sensors()
+    matrix = wrench_matrix(sources[0].description)
+    back = np.linalg.pinv(matrix)
+    # What no wrench shows, the load of one diagonal, stays.
+    turned = back @ np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]) @ matrix + np.eye(8) - back @ matrix
+    return [replace(plate, measured=plate.measured @ turned.T) for plate in sources]
 
 
 def of_points(
@@ -137,6 +148,11 @@ FAULTS = {
     "Fx and Fy reversed": (of_c3d_with_level_reversed, {}, "reversed Fx and Fy"),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
     "eight sensors, sound": (of_sensors, {}, ""),
+    "eight sensors, moments reversed": (
+        of_sensors_whose_moments_are_reversed,
+        {},
+        "reversed the moments",
+    ),
     "a point and a torque, sound": (of_points, {}, ""),
     "a torque in N mm": (of_points, {"torque_scale": 1e3}, "N mm"),
     "a point in m, taken for mm": (of_points, {"point_scale": 1e-3}, "points of force in m"),
@@ -175,6 +191,36 @@ def test_the_forces_of_the_person_come_back(name):
     free = np.zeros_like(force)
     free[..., 2] = 0.002 * force[..., 2]
     np.testing.assert_allclose(wrench[..., 3:], np.cross(point, force) + free, atol=0.3)
+
+
+def prior_of(one: Hypothesis) -> float:
+    likelihoods = sum(fit.log_likelihood for fit in one.fits.values())
+    return one.log_posterior - likelihoods - one.balance.log_likelihood(USUAL)
+
+
+def test_a_fault_of_all_plates_counts_once_beside_one_of_a_single_plate():
+    trials = [TrialSamples.of(opened(of_c3d(moment_scale=1e-3)))]
+    stated = Hypothesis.as_stated(FrameChange(), trials, USUAL)
+    now = max(stated.with_one_more(), key=lambda one: one.log_posterior)
+    more = "exchanged Mx and My"
+    (one,) = (
+        one
+        for one in now.with_one_more()
+        if [fit.reading.channels for fit in one.fits.values()] == [more, ""]
+    )
+    (rare,) = PlateReading(channels=more).repairs().values()
+    assert prior_of(one) == pytest.approx(prior_of(now) + rare + ONE_ALONE)
+
+
+def test_no_reading_is_tried_twice():
+    trials = [TrialSamples.of(opened(of_c3d(moment_scale=1e-3)))]
+    now = Hypothesis.as_stated(FrameChange(), trials, USUAL)
+    for _ in range(2):
+        tried = [now, *now.with_one_more()]
+        readings = [tuple(fit.reading for fit in one.fits.values()) for one in tried]
+        assert len(set(readings)) == len(readings)
+        now = max(tried, key=lambda one: one.log_posterior)
+    assert now.fits["1"].reading.moment_scale == 1e3
 
 
 def test_exchanged_plates():

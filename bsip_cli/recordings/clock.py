@@ -35,7 +35,7 @@ _NEAR_S = 0.1  # lags so near are one
 
 @dataclass(frozen=True)
 class Delay:
-    """Of the forces after the body; ``kept`` : the part of the trial that then has both;
+    """Of the forces after the body; ``kept`` : the part of the trial whose forces are then known;
     ``log_posterior`` : how rare it is, and how well lift and body then go together."""
 
     seconds: float = 0.0
@@ -119,9 +119,8 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
         total[: len(samples)] += pushing if np.nansum(pushing[:, 2]) >= 0 else -pushing
     most = min(round(_MOST_S * rate_hz / step), len(total))
     by = np.arange(-most, most + 1)
-    kept = 1.0 - np.abs(by) / len(total)
     found = [_goes(body, total, k, limits) for k in by.tolist()]
-    return Lags(by * step / rate_hz, kept, *np.array(found).T)
+    return Lags(by * step / rate_hz, *np.array(found).T)
 
 
 def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
@@ -145,10 +144,13 @@ def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict
 
 
 def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, ...]:
-    part = Delay(kept=1.0 - abs(by) / len(total)).limits(limits)
-    balance = Balance.of(body, _shifted(total, by), part)
+    """As `Lags` has it from ``kept`` on."""
+    later = _shifted(total, by)
+    kept = float(np.isfinite(later).all(axis=1).mean())
+    part = Delay(kept=kept).limits(limits)
+    balance = Balance.of(body, later, part)
     lift, level = balance.lift_log_likelihood(), balance.level_log_likelihood()
-    return lift + balance.log_likelihood(part), lift + level, lift
+    return kept, lift + balance.log_likelihood(part), lift + level, lift
 
 
 def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:

@@ -20,8 +20,8 @@ from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, r
 from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
 from bsip_cli.diagnosis.held_out import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.nameless import UNEXPLAINED
 
 _TRIED = 8  # candidates of a round that are fitted in full
 _OF_A_KIND = 2  # of them, of the same effect
@@ -166,7 +166,8 @@ def _verdict(
         for key, x in mine.items():
             if x.fault.effect.name == UNEXPLAINED:
                 mine[key] = replace(x, log_odds=x.log_odds - np.log(library.prior_odds))
-    weighed = [each for x in mine.values() for each in x.evenly_or_not(inflation, odds)]
+    others_evenly = (x for key, x in mine.items() if key != one.key)
+    weighed = [*mine[one.key].evenly_or_not(inflation, odds), *others_evenly]
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
@@ -241,11 +242,12 @@ def _chosen(
 ) -> Iterator[list[int]]:
     """The likeliest kinds of places, each with its values of a scan; no effect takes all of them.
 
-    Where a regularity without a name is in the model already nothing more can be named: what it
-    leaves has no name either.
+    Where an error without a name is in the model already nothing more can be named: what it leaves
+    has no name either. What stands beside it may be another of the named ones.
     """
     known = {(*one.key, t) for one in fit.faults for t in one.trials}
-    closed = {t for one in fit.faults if one.effect.name == UNEXPLAINED for t in one.trials}
+    unnamed = (one for one in fit.faults if one.effect.name == UNEXPLAINED)
+    closed = {t for one in unnamed for t in one.trials} if asked is None else set()
     kinds: dict[tuple[Effect, str, tuple[int, ...]], list[int]] = {}
     for k, place in enumerate(library.places):
         effect, target, trials = place.kind

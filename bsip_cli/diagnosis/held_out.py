@@ -12,8 +12,8 @@ from scipy.special import logsumexp
 
 from bsip_cli.diagnosis.error_model import posterior
 from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
-from bsip_cli.diagnosis.patterns import UNEXPLAINED, Nameless
 from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.nameless import UNEXPLAINED, Nameless
 from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
 

@@ -84,8 +84,6 @@ class Candidate:
     def label(self) -> str:
         """``force plate turned or tilted: plate 1``."""
         where = effect_words.place_label(self.effect, self.target)
-        if self.effect == UNNAMED and self.numbers and self.target:
-            where = effect_words.unnamed_label(self.numbers[0].name, where)
         return effect_words.effect_title(self.effect) + (f": {where}" if where else "")
 
     @property

@@ -13,8 +13,8 @@ from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
-from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
+from bsip_cli.effects.nameless import NAMELESS
 from bsip_cli.effects.scene import Scene
 from tests.diagnosis.noisy_trial import (
     late,
@@ -27,7 +27,7 @@ from tests.diagnosis.noisy_trial import (
 
 NAMED_FROM, ODDS = 0.95, 0.1
 OF_THE_LAB = ("sync_offset", "plate_gain", "plate_zero", "gravity_tilt")
-ASKED = (*(EFFECTS[name] for name in OF_THE_LAB), *PATTERNS)
+ASKED = (*(EFFECTS[name] for name in OF_THE_LAB), *NAMELESS)
 SEEDS = (1, 2, 3)
 
 

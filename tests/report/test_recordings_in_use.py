@@ -307,7 +307,7 @@ def test_a_fault_says_what_it_changes_at_the_joints(record):
         "changes the left knee's moment by 9 % of its peak"
     )
     small = peaks.assign(change_percent=0.4)
-    assert moment_change(causes[0], causes, small) == "changes no joint moment by 1 %"
+    assert moment_change(causes[0], causes, small) == "changes no joint moment by as much as 1 %"
     assert moment_change(causes[0], causes, pd.DataFrame()) == ""
     other = causes_of(candidates_of(fault("sync_offset", SEQUENCE)))
     assert moment_change(other[0], other, peaks) == ""

@@ -200,7 +200,8 @@ def can_be_uneven(effect: Effect) -> bool:
 
 
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
-    """Logarithm of the Bayes factor of a size that differs from block to block, against one size.
+    """Logarithm of the Bayes factor of a size that is not the same throughout, against one size:
+    it differs from block to block, or is another one from a block of a trial on.
 
     inflation (T,) : the trials' likelihoods count by so much less.
     """
@@ -216,8 +217,25 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
         grams.append(white.T @ white / inflation[t])
         shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)
-    values, vectors = np.linalg.eigh(block_diag(*grams) - taken.T @ taken)
-    along, values = vectors.T @ np.concatenate(pulls), np.maximum(values, 0.0)
-    added = 1 + _SHARES[:, None] ** 2 * values
-    logs = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
-    return float(logsumexp(logs) - np.log(len(logs)))
+    gram = block_diag(*grams) - taken.T @ taken
+    values, vectors = np.linalg.eigh(gram)
+    from_block_to_block = _of_shares(vectors.T @ np.concatenate(pulls), values).sum(axis=1)
+    stepwise, first = 0.0, 0
+    for pull in pulls:
+        mine = slice(first, first := first + len(pull))
+        later = np.tril(np.ones((len(pull), len(pull))))
+        steps = _of_shares(later.T @ pull, np.diag(later.T @ gram[mine, mine] @ later))
+        stepwise += float(np.logaddexp(0.0, _mean(steps))) - np.log(2)  # or none in this trial
+    return _mean(np.array([_mean(from_block_to_block), stepwise]))
+
+
+def _of_shares(pull: np.ndarray, information: np.ndarray) -> np.ndarray:
+    """(S, b) logarithms of the Bayes factors of differences by each share, with pull (b,) and
+    information (b,)."""
+    added = 1 + _SHARES[:, None] ** 2 * np.maximum(information, 0.0)
+    return np.asarray(0.5 * (_SHARES[:, None] ** 2 * pull**2 / added - np.log(added)))
+
+
+def _mean(logs: np.ndarray) -> float:
+    """Logarithm of the mean of what has these logarithms."""
+    return float(logsumexp(logs) - np.log(logs.size))

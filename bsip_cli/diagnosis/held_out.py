@@ -217,14 +217,17 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
         grams.append(white.T @ white / inflation[t])
         shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)
-    gram = block_diag(*grams) - taken.T @ taken
+    gram, pull = block_diag(*grams) - taken.T @ taken, np.concatenate(pulls)
+    throughout = gram.sum(axis=1) / np.sqrt(gram.sum())  # of another size in all blocks: the fault
+    pull = pull - throughout * pull.sum() / np.sqrt(gram.sum())
+    gram = gram - np.outer(throughout, throughout)
     values, vectors = np.linalg.eigh(gram)
-    from_block_to_block = _of_shares(vectors.T @ np.concatenate(pulls), values).sum(axis=1)
+    from_block_to_block = _of_shares(vectors.T @ pull, values).sum(axis=1)
     stepwise, first = 0.0, 0
-    for pull in pulls:
-        mine = slice(first, first := first + len(pull))
-        later = np.tril(np.ones((len(pull), len(pull))))
-        steps = _of_shares(later.T @ pull, np.diag(later.T @ gram[mine, mine] @ later))
+    for count in map(len, pulls):
+        mine = slice(first, first := first + count)
+        later = np.tril(np.ones((count, count)))
+        steps = _of_shares(later.T @ pull[mine], np.diag(later.T @ gram[mine, mine] @ later))
         stepwise += float(np.logaddexp(0.0, _mean(steps))) - np.log(2)  # or none in this trial
     return _mean(np.array([_mean(from_block_to_block), stepwise]))
 

@@ -156,6 +156,8 @@ def _means(
 # itself or more has another cause, which no catalogue knows.
 
 _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault differs
+# Steps, of itself: what begins late in a trial is so many times its mean. The spreads overlap.
+_STEPS, _SPREAD = np.geomspace(0.3, 3.0, 5), 0.3
 
 
 class Uneven(Nameless):
@@ -222,21 +224,28 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
     pull = pull - throughout * pull.sum() / np.sqrt(gram.sum())
     gram = gram - np.outer(throughout, throughout)
     values, vectors = np.linalg.eigh(gram)
-    from_block_to_block = _of_shares(vectors.T @ pull, values).sum(axis=1)
-    stepwise, first = 0.0, 0
+    along, added = vectors.T @ pull, 1 + _SHARES[:, None] ** 2 * np.maximum(values, 0.0)
+    everywhere = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
+    some, first = 0.0, 0  # logarithm of the sum over all choices of trials in which a step is
     for count in map(len, pulls):
         mine = slice(first, first := first + count)
         later = np.tril(np.ones((count, count)))
-        steps = _of_shares(later.T @ pull[mine], np.diag(later.T @ gram[mine, mine] @ later))
-        stepwise += float(np.logaddexp(0.0, _mean(steps))) - np.log(2)  # or none in this trial
-    return _mean(np.array([_mean(from_block_to_block), stepwise]))
+        information = np.diag(later.T @ gram[mine, mine] @ later)
+        some += float(np.logaddexp(0.0, _mean(_of_steps(later.T @ pull[mine], information))))
+    steps = some + np.log(-np.expm1(-some)) - np.log(2.0 ** len(pulls) - 1)  # but for none
+    return _mean(np.array([_mean(everywhere), steps]))
 
 
-def _of_shares(pull: np.ndarray, information: np.ndarray) -> np.ndarray:
-    """(S, b) logarithms of the Bayes factors of differences by each share, with pull (b,) and
-    information (b,)."""
-    added = 1 + _SHARES[:, None] ** 2 * np.maximum(information, 0.0)
-    return np.asarray(0.5 * (_SHARES[:, None] ** 2 * pull**2 / added - np.log(added)))
+def _of_steps(pull: np.ndarray, information: np.ndarray) -> np.ndarray:
+    """Logarithms of the Bayes factors of steps of all sizes, up and down, against none, from their
+    pull (b,) and information (b,)."""
+    information = np.maximum(information, 1e-9)
+    found, variance = pull / information, 1 / information
+    size = np.concatenate([_STEPS, -_STEPS])[:, None]
+    total = variance + (_SPREAD * size) ** 2
+    return np.asarray(
+        0.5 * (found**2 / variance - (found - size) ** 2 / total - np.log(total / variance))
+    )
 
 
 def _mean(logs: np.ndarray) -> float:

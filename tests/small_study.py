@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
@@ -44,7 +44,7 @@ class Run:
 
     def copied_to(self, folder: Path) -> Self:
         """A copy to change."""
-        copy = self.within(folder)
+        copy = replace(self, study=folder / "study", out=folder / "out")
         shutil.copytree(self.study, copy.study)
         if self.out.exists():
             shutil.copytree(self.out, copy.out)

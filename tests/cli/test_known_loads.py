@@ -141,7 +141,7 @@ def carried(tmp_path_factory):
 
 @pytest.fixture
 def run(carried, tmp_path) -> LoadedRun:
-    return carried.copied_to(tmp_path)
+    return replace(carried.copied_to(tmp_path), changes={})
 
 
 WORN = (

@@ -97,6 +97,11 @@ def owners_of(names: set[str], stage: str) -> set[str]:
     }
 
 
+def options_in(folder: Path, text: str) -> Path:
+    (folder / "own.toml").write_text(text)
+    return folder / "own.toml"
+
+
 @pytest.fixture(scope="session")
 def first_run(tmp_path_factory, bsip):
     """Made once; nobody changes it."""
@@ -241,14 +246,9 @@ def test_methods_say_what_was_done(first_run, bsip, tmp_path):
 
 
 def test_methods_name_options_that_differ(run, bsip, tmp_path):
-    other = tmp_path / "other.toml"
-    other.write_text("[reconstruct]\ncutoff_hz = 7.0\n")
-    assert (
-        bsip(
-            "reconstruct", run.study, "--out", run.out, "--participant", "sub-01", "--config", other
-        ).code
-        == 0
-    )
+    other = options_in(tmp_path, "[reconstruct]\ncutoff_hz = 7.0\n")
+    asked = ("--participant", "sub-01", "--config", other)
+    assert bsip("reconstruct", run.study, "--out", run.out, *asked).code == 0
     text = " ".join(bsip("methods", run.out).out.split())
     assert "Options that differ among the results (the text gives the first): reconstruct." in text
     assert "below 7.0 Hz" in text
@@ -380,8 +380,7 @@ def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
 
 
 def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
@@ -405,8 +404,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
 
 
 def test_changed_option_of_the_cohort(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[stats]\nalpha = 0.04\n")
+    own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
     times = run.times()
     answer = bsip("run", run.study, "--out", run.out, "--config", own)
     assert answer.summary.startswith(f"bsip run: 3 done, {UNITS - 3} up to date;")
@@ -538,8 +536,7 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
 
 
 def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
     answer = bsip("run", run.study, "--out", run.out, "--config", own, "--group")
     assert answer.code == 3
@@ -555,8 +552,7 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
 
 
 def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[stats]\nalpha = 0.04\n")
+    own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
     answer = bsip("tables", run.study, "--out", run.out, "--config", own)
     assert answer.code == 0
     assert answer.err.splitlines()[0] == (

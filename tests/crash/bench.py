@@ -14,8 +14,8 @@ from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.errors import BadDataError
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from tests.small_study import small
 
 GONE_S = 5.0  # within which all processes are gone after a signal, or after their parent
 POLL_S = 0.005
@@ -24,15 +24,7 @@ _UNFINISHED = ".*.bsip-part"
 
 
 def make_study(folder: Path, participants: int) -> Path:
-    options = StudyOptions(
-        participants=participants,
-        seed=3,
-        sexes="MF",
-        tasks=("static",),
-        durations_s={"static": 1.0},
-        rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    )
-    simulate_study(folder, options)
+    simulate_study(folder, small(("MF" * participants)[:participants], static=1.0))
     return folder
 
 

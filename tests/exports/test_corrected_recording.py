@@ -28,21 +28,14 @@ from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session
 from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.command import inject_study
-from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
+from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnose_trial import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
+from tests.small_study import small
 
 STEM, STATIC = "sub-01_task-squat_run-1", "sub-01_task-static"
-OPTIONS = StudyOptions(
-    participants=1,
-    seed=8,
-    sexes="M",
-    tasks=("static", "squat"),
-    durations_s={"static": 1.0, "squat": 3.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    laboratory=Laboratory(plate_per_foot=True),
-)
+OPTIONS = replace(small("M", 8, static=1.0, squat=3.0), laboratory=Laboratory(plate_per_foot=True))
 PAIR, SWAPS = ("RKNEL", "RKNEM"), ((0.5, 0.9), (1.0, 2.0))
 
 # What is hidden, and the same as a diagnosis says it: the file's y and z are the plate's reversed.
@@ -65,6 +58,14 @@ TURNED_CAMERAS = fault("camera_frame", 0.02, "x", "", 0.02, 0.0)
 LEVER_NM = 1.2  # 4 % of what is on plate 2, at the depth of its sensor under its surface
 
 
+def _cause(
+    effect: str, target: str, values: list[float], trials: Sequence[str], verdict: str = "named"
+) -> dict:
+    """As in the facts of a diagnosis."""
+    known = {"effect": effect, "target": target, "trials": [*trials], "verdict": verdict}
+    return known | {"values": values, "folds": [values] * 5}
+
+
 @dataclass(frozen=True)
 class Study:
     """As it was, with something hidden in it, and what is known of the latter."""
@@ -83,33 +84,16 @@ class Study:
     ) -> None:
         """``alike``: effect and target of what cannot be told from the causes. ``numbers`` and
         ``rejected``: sizes of them that are named and rejected, one of each."""
-        verdict = "ambiguous" if alike else "named"
-        group = [*((effect, target) for effect, target, _ in causes), *alike]
-        none = nothing(0.01, (STEM,))
-        findings = (
-            replace(none, effect=effect, target=target, class_id="A" if alike else "")
-            for effect, target in (group if alike else ())
-        )
-        sized = (
-            replace(none, effect=effect, target=target, numbers=(one,))
-            for (effect, target, _), one in zip(causes, numbers, strict=False)
-        )
-        hardly = (
-            replace(none, effect=effect, target=target, numbers=(one,), verdict="rejected")
-            for (effect, target, _), one in zip(causes, rejected, strict=False)
-        )
-        table = rows_of((*findings, *sized, *hardly), ())
-        facts = [
-            {
-                "effect": effect,
-                "target": target,
-                "trials": [*concerned],
-                "verdict": verdict,
-                "values": values,
-                "folds": [values] * 5,
-            }
-            for effect, target, values in causes
-        ]
+        verdict, none = "ambiguous" if alike else "named", nothing(0.01, (STEM,))
+        of_causes = [replace(none, effect=effect, target=target) for effect, target, _ in causes]
+        others = [replace(none, effect=effect, target=target) for effect, target in alike]
+        group = [replace(one, class_id="A") for one in (*of_causes, *others)] if alike else []
+        sizes = [(one, (x,)) for one, x in zip(of_causes, numbers, strict=False)]
+        sized = [replace(one, numbers=x) for one, x in sizes]
+        less = [(one, (x,)) for one, x in zip(of_causes, rejected, strict=False)]
+        hardly = [replace(one, numbers=x, verdict="rejected") for one, x in less]
+        table = rows_of((*group, *sized, *hardly), ())
+        facts = [_cause(*one, concerned, verdict) for one in causes]
         wrenches = (self.made.out / "sub-01").glob("*_wrench.parquet")
         made_by = {"inputs": {path.name: file_hash(path) for path in wrenches}}
         notes = NOTES | {"made_by": made_by, "facts": {"causes": facts, "trials": [*looked_at]}}
@@ -143,17 +127,16 @@ def hide(tmp_path, plain):
             change(path)
         assert run_session("ingest", made.study, made.out, (), None, jobs=1, force=False) == 0
         write_person(made, "sub-01")
+        nothing = empty_table("marker-events")
         swaps = [
-            dict.fromkeys(empty_table("marker-events").columns, 0.0)
+            dict.fromkeys(nothing.columns, 0.0)
             | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
             | {"start_s": start, "end_s": end - 0.01, "put_right": True}
             for start, end in SWAPS
             if any(one.name == "marker_swap" for one in asked)
         ]
-        for task in ("squat_run-1", "static"):
-            path = made.out / "sub-01" / f"sub-01_task-{task}_marker-events.parquet"
-            table = pd.DataFrame(swaps) if swaps and task != "static" else None
-            events = empty_table("marker-events") if table is None else table
+        for stem, events in ((STEM, pd.DataFrame(swaps) if swaps else nothing), (STATIC, nothing)):
+            path = made.out / "sub-01" / f"{stem}_marker-events.parquet"
             write_artifact(path, "marker-events", events, NOTES)
         return Study(plain, made)
 
@@ -236,18 +219,21 @@ def test_markers_and_forces_are_turned_into_true_axes(hide, turned):
 def test_a_recording_that_nobody_looked_at_has_what_its_session_shares(
     concerned, looked_at, session, found
 ):
+    unit = unit_of_c(_cause("plate_gain", "1 fz", [0.06], concerned), looked_at, session)
+    assert len(causes_here(unit, ["1"])) == found
+    assert not causes_here(unit, ["2"])
+
+
+def unit_of_c(cause: dict, looked_at: str, session: str = "") -> SimpleNamespace:
+    """The recording C beside A and B, and a diagnosis that looked at some of them."""
     trials = [SimpleNamespace(stem=stem, session=session if stem == "C" else "") for stem in "ABC"]
-    cause = {"effect": "plate_gain", "target": "1 fz", "trials": [*concerned], "verdict": "named"}
-    facts = {"causes": [cause | {"values": [0.06], "folds": [[0.06]]}], "trials": [*looked_at]}
-    unit = SimpleNamespace(
+    return SimpleNamespace(
         name="C",
         own_trial=trials[2],
         person=SimpleNamespace(id="sub-01", trials=trials),
-        facts=lambda kind: facts,
+        facts=lambda kind: {"causes": [cause], "trials": [*looked_at]},
         has=lambda kind: False,
     )
-    assert len(causes_here(unit, ["1"])) == found
-    assert not causes_here(unit, ["2"])
 
 
 def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(hide, capsys):
@@ -417,16 +403,7 @@ def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
 
 
 def test_a_zero_is_not_taken_off_for_what_the_others_of_the_session_have():
-    trials = [SimpleNamespace(stem=stem, session="") for stem in "ABC"]
-    cause = {"effect": "plate_zero", "target": "1 fz", "trials": ["A", "B"], "verdict": "named"}
-    facts = {"causes": [cause | {"values": [9.0], "folds": [[9.0]]}], "trials": ["A", "B"]}
-    unit = SimpleNamespace(
-        name="C",
-        own_trial=trials[2],
-        person=SimpleNamespace(id="sub-01", trials=trials),
-        facts=lambda kind: facts,
-        has=lambda kind: False,
-    )
+    unit = unit_of_c(_cause("plate_zero", "1 fz", [9.0], "AB"), "AB")
     assert len(causes_here(unit, ["1", "2"], zeroed=["2"])) == 1
     assert not causes_here(unit, ["1", "2"], zeroed=["1"])
 
@@ -452,18 +429,24 @@ def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
     assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
 
 
-def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
+@pytest.mark.parametrize(
+    ("effect", "target", "said"),
+    [
+        ("plate_gain", "all fz", "not corrected: plate_gain all fz: one of several causes"),
+        ("unexplained", "", ": its signal is not known exactly"),
+        ("marker_shift", "T10", "marker_shift T10: one of several causes"),
+    ],
+)
+def test_what_the_diagnosis_did_not_size_is_said(hide, capsys, effect, target, said):
     study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("plate_gain", "all fz")])
+    study.diagnosed_as(alike=[(effect, target)])
     study.exported()
-    assert "not corrected: plate_gain all fz: one of several causes" in capsys.readouterr().err
+    assert said in capsys.readouterr().err
 
 
-def test_what_has_no_name_is_said(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("unexplained", "")])
-    study.exported()
-    assert ": its signal is not known exactly" in capsys.readouterr().err
+def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size():
+    assert why_left("marker_shift", "unknown").startswith("no fault of the plates")
+    assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
@@ -476,24 +459,17 @@ def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
     )
 
 
-def test_the_size_is_said_with_its_interval(hide, capsys):
+@pytest.mark.parametrize("rejected", [(), (Number("gain", "1", 0.01, 0.0, 0.1),)])
+def test_the_size_is_said_with_its_interval(hide, capsys, rejected):
+    """Not a rejected one: what the laboratory has is looked for in each person once more."""
     study = hide(GAIN[0])
-    study.diagnosed_as(GAIN[1], numbers=(Number("gain", "1", 0.06, 0.0552, 0.0657),))
+    found = (Number("gain", "1", 0.06, 0.0552, 0.0657),)
+    study.diagnosed_as(GAIN[1], numbers=found, rejected=rejected)
     path = study.exported()
     said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
     assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
     entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
     assert said in entry
-
-
-def test_the_size_that_is_said_is_not_a_rejected_one(hide, capsys):
-    """What the laboratory has is looked for in each person once more, and not found."""
-    study = hide(GAIN[0])
-    found, other = Number("gain", "1", 0.06, 0.0552, 0.0657), Number("gain", "1", 0.01, 0.0, 0.1)
-    study.diagnosed_as(GAIN[1], numbers=(found,), rejected=[other])
-    study.exported()
-    said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
-    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
 
 
 def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(hide, capsys):
@@ -516,15 +492,6 @@ def test_the_size_that_is_told_is_taken_off(hide):
     study.diagnosed_as(own, numbers=(Number("gain", "1", 0.06, 0.05, 0.07),))
     before, after = both(study, study.exported())
     assert np.abs(wrenches(after) - wrenches(before))[..., :3].max() < 0.05
-
-
-def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("marker_shift", "T10")])
-    study.exported()
-    assert "marker_shift T10: one of several causes" in capsys.readouterr().err
-    assert why_left("marker_shift", "unknown").startswith("no fault of the plates")
-    assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

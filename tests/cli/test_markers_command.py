@@ -33,27 +33,11 @@ def here(tmp_path, monkeypatch):
 
 def recording(folder: Path, labels: Sequence[str], empty: Sequence[str] = ()) -> Path:
     """A TRC file of two frames with markers at different places, on a line as long as a person."""
-    path = folder / "a trial.trc"
-    places_mm = 1e3 * LINE_M / np.sqrt(3) * np.arange(len(labels)) / len(labels)
-    rows = [
-        "\t".join(
-            [str(frame + 1), f"{frame / 100:g}"]
-            + [
-                "\t\t" if label in empty else f"{x:.4f}\t{x + 1:.4f}\t{x + 2:.4f}"
-                for x, label in zip(places_mm, labels, strict=True)
-            ]
-        )
-        for frame in range(2)
-    ]
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
-        f"100\t100\t2\t{len(labels)}\tmm",
-        "Frame#\tTime\t" + "\t\t\t".join(labels) + "\t\t",
-        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(labels) + 1)),
-    ]
-    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
-    return path
+    places_m = LINE_M / np.sqrt(3) * np.arange(len(labels)) / len(labels)
+    frame = places_m[:, None] + [0.0, 0.001, 0.002]
+    frame[np.isin(labels, empty)] = np.nan
+    times = np.array([0.0, 0.01])
+    return write_trc(folder / "a trial.trc", times, np.stack([frame, frame]), labels)
 
 
 def told(path: Path, **options) -> int:

@@ -143,9 +143,36 @@ def hide(tmp_path, plain):
     return hidden
 
 
-def both(study: Study, path: Path) -> tuple[Recording, Recording]:
-    """The recording as it was before anything was hidden, and as it is exported."""
-    return read_recording(study.plain / "sub-01" / path.name), read_recording(path)
+@dataclass(frozen=True)
+class Corrected:
+    """A recording as it was before anything was hidden, with it, and as it is exported; and what
+    was said."""
+
+    plain: Path
+    spoilt: Path
+    path: Path
+    said: str
+
+    def both(self) -> tuple[Recording, Recording]:
+        """Before anything was hidden, and as exported."""
+        return read_recording(self.plain), read_recording(self.path)
+
+    def is_as_it_was(self) -> bool:
+        return self.path.read_bytes() == self.spoilt.read_bytes()
+
+
+@pytest.fixture
+def corrected(hide, capsys):
+    """Hides faults and corrects what a diagnosis names, ``known`` as of `Study.diagnosed_as`."""
+
+    def of(*asked: Asked, causes: Sequence = (), change=None, **known) -> Corrected:
+        study = hide(*asked, change=change)
+        study.diagnosed_as(*causes, **known)
+        path = study.exported()
+        places = (root / "sub-01" / path.name for root in (study.plain, study.made.study))
+        return Corrected(*places, path, capsys.readouterr().err)
+
+    return of
 
 
 def wrenches(recording: Recording) -> np.ndarray:
@@ -154,28 +181,24 @@ def wrenches(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.parametrize("faults", [(GAIN, ZERO), (TURNED, ASIDE), (LEAK,)])
-def test_plates_read_what_they_would_have_read(hide, faults, capsys):
-    study = hide(*(asked for asked, _ in faults))
-    study.diagnosed_as(*(cause for _, cause in faults))
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+def test_plates_read_what_they_would_have_read(corrected, faults):
+    asked, causes = zip(*faults, strict=True)
+    one = corrected(*asked, causes=causes)
+    before, after = one.both()
     apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
     assert (apart[:3] < 0.05).all() and (apart[3:] < (LEVER_NM if LEAK in faults else 0.02)).all()
     assert np.array_equal(before.markers_m, after.markers_m, equal_nan=True)
     for _, (effect, target, _) in faults:
-        assert f"{STEM}: corrected: {effect} {target}: " in said
+        assert f"{STEM}: corrected: {effect} {target}: " in one.said
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("faults", [(GAIN, LATE), (ASIDE, SLOW), (LATE, SLOW)])
-def test_forces_are_back_at_their_time(hide, faults, capsys):
+def test_forces_are_back_at_their_time(corrected, faults):
     """Noise between samples is interpolated twice, so tenths of a second are compared."""
-    study = hide(*(asked for asked, _ in faults))
-    study.diagnosed_as(*(cause for _, cause in faults))
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+    asked, causes = zip(*faults, strict=True)
+    one = corrected(*asked, causes=causes)
+    before, after = one.both()
     first = round((after.time0_s - before.time0_s) * before.marker_rate_hz)
     assert 0 < before.n_frames - first - after.n_frames <= 4
     shown = before.markers_m[first : first + after.n_frames]
@@ -183,19 +206,17 @@ def test_forces_are_back_at_their_time(hide, faults, capsys):
     now, then = wrenches(after), wrenches(before)[:, 5 * first :][:, : 5 * after.n_frames]
     apart = uniform_filter1d(now - then, 25, axis=1)[:, 25:-25]
     assert np.abs(apart[..., :3]).max() < 0.5 and np.abs(apart[..., 3:]).max() < 0.3
-    spoilt = wrenches(read_recording(study.made.study / "sub-01" / path.name))
+    spoilt = wrenches(read_recording(one.spoilt))
     spoilt = spoilt[:, : now.shape[1]] - wrenches(before)[:, 5 * first :][:, : now.shape[1]]
     assert np.abs(uniform_filter1d(spoilt, 25, axis=1)[:, 25:-25]).max() > 3.0
-    assert "frames left out at the end, whose forces were not recorded: " in said
+    assert "frames left out at the end, whose forces were not recorded: " in one.said
 
 
 @pytest.mark.parametrize("turned", [TILTED, TURNED_CAMERAS])
-def test_markers_and_forces_are_turned_into_true_axes(hide, turned):
-    study = hide(turned[0])
-    study.diagnosed_as(turned[1])
-    path = study.exported()
-    before, after = both(study, path)
-    spoilt = read_recording(study.made.study / "sub-01" / path.name)
+def test_markers_and_forces_are_turned_into_true_axes(corrected, turned):
+    one = corrected(turned[0], causes=[turned[1]])
+    before, after = one.both()
+    spoilt = read_recording(one.spoilt)
     assert np.nanmax(np.abs(spoilt.markers_m - before.markers_m)) > 0.01
     shift = np.nanmedian(after.markers_m - before.markers_m, axis=(0, 1))  # the file's pivot is not
     if turned is TURNED_CAMERAS:  # that of who hid it
@@ -236,7 +257,9 @@ def unit_of_c(cause: dict, looked_at: str, session: str = "") -> SimpleNamespace
     )
 
 
-def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(hide, capsys):
+def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(
+    hide, plain, capsys
+):
     study = hide(GAIN[0])
     study.diagnosed_as(looked_at=(STATIC,))
     named = {"effect": "plate_gain", "target": "1 fz", "parameter": "gain", "estimate": 0.06}
@@ -263,7 +286,7 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     facts = {"persons": {"1": {"sub-01": "sub-01", "sub-02": "sub-02"}}, "answer": {}}
     write_artifact(path, "laboratory", rows, NOTES | {"facts": facts})
     exported = study.exported()
-    before, after = both(study, exported)
+    before, after = (read_recording(x) for x in (plain / "sub-01" / exported.name, exported))
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
     said = capsys.readouterr().err
     assert f"{STEM}: corrected: plate_gain 1 fz: gain 6 % taken off" in said
@@ -278,14 +301,12 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     assert f"export: {STEM}: nothing to correct" in capsys.readouterr().err
 
 
-def test_plates_that_tell_points_read_what_they_would_have_read(hide, capsys):
+def test_plates_that_tell_points_read_what_they_would_have_read(corrected):
     """Force and centre of pressure as channels (TYPE 1)."""
-    study = hide(ZERO[0], TURNED[0], change=into_points)
-    study.diagnosed_as(ZERO[1], TURNED[1])
-    path = study.exported()
-    assert "corrected: plate_zero" in capsys.readouterr().err
-    before, after = both(study, path)
-    assert ezc3d.c3d(str(path))["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"][0] == 1
+    one = corrected(ZERO[0], TURNED[0], causes=[ZERO[1], TURNED[1]], change=into_points)
+    assert "corrected: plate_zero" in one.said
+    before, after = one.both()
+    assert ezc3d.c3d(str(one.path))["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"][0] == 1
     apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
     assert (apart[:3] < 0.05).all() and (apart[3:] < 0.1).all()
 
@@ -314,25 +335,22 @@ def into_points(path: Path) -> None:
     c3d.write(str(path))
 
 
-def test_labels_are_exchanged_back_and_the_file_says_so(hide, capsys):
-    study = hide(
+def test_labels_are_exchanged_back_and_the_file_says_so(corrected):
+    one = corrected(
         *(
             Asked("marker_swap", end - start, f"{'+'.join(PAIR)},start_s={start}")
             for start, end in SWAPS
         )
     )
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+    before, after = one.both()
     assert np.allclose(before.markers_m, after.markers_m, atol=1e-7, equal_nan=True)
     assert np.array_equal(wrenches(before), wrenches(after))
     words = f"labels {' and '.join(PAIR)} exchanged from 1.000 to 1.990 s"
-    assert words in said
-    old, new = (ezc3d.c3d(str(one)) for one in (study.made.study / "sub-01" / path.name, path))
+    assert words in one.said
+    old, new = (ezc3d.c3d(str(path)) for path in (one.spoilt, one.path))
     entry = " ".join(new["parameters"]["BSIP"]["CORRECTED"]["value"])
     assert words in entry and f"bsip {__version__}: corrected by" in entry
-    assert file_hash(study.made.study / "sub-01" / path.name) in entry.replace(" ", "")
+    assert file_hash(one.spoilt) in entry.replace(" ", "")
     assert all_else_is_equal(old, new)
 
 
@@ -354,7 +372,7 @@ def all_else_is_equal(old, new) -> bool:
     return True
 
 
-def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path, capsys):
+def test_channels_that_ingest_corrects_are_corrected_in_the_file(corrected):
     """Moments in N mm that are said to be N m, in all trials."""
 
     def misread(path: Path) -> None:
@@ -364,15 +382,12 @@ def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path,
         c3d["parameters"]["ANALOG"]["UNITS"]["value"] = ["Nm" if u == "Nmm" else u for u in units]
         c3d.write(str(path))
 
-    study = hide(change=misread)
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
+    one = corrected(change=misread)
     for plate in "12":
-        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in said
-    before, after = both(study, path)
+        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in one.said
+    before, after = one.both()
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.01
-    units = ezc3d.c3d(str(path))["parameters"]["ANALOG"]["UNITS"]["value"]
+    units = ezc3d.c3d(str(one.path))["parameters"]["ANALOG"]["UNITS"]["value"]
     assert "Nm" in units and "Nmm" not in units
 
 
@@ -387,15 +402,11 @@ def lifted(path: Path) -> None:
         c3d.write(str(path))
 
 
-def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
-    study = hide(change=lifted)
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
-    assert f"{STEM}: corrected: plate 2: its reading without load, (" in said
-    assert said.count("its reading without load") == 1
-    before = wrenches(read_recording(study.made.study / "sub-01" / path.name))
-    after = wrenches(read_recording(path))
+def test_what_a_plate_reads_without_load_is_taken_off_once(corrected):
+    one = corrected(change=lifted)
+    assert f"{STEM}: corrected: plate 2: its reading without load, (" in one.said
+    assert one.said.count("its reading without load") == 1
+    before, after = (wrenches(read_recording(path)) for path in (one.spoilt, one.path))
     taken = before - after
     assert np.allclose(taken[0], 0.0, atol=1e-4)
     assert np.allclose(np.abs(taken[1, :, 2]), 12.0, atol=0.1)
@@ -408,25 +419,19 @@ def test_a_zero_is_not_taken_off_for_what_the_others_of_the_session_have():
     assert not causes_here(unit, ["1", "2"], zeroed=["1"])
 
 
-def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0]))
-    path = study.exported()
-    said = capsys.readouterr().err
-    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
+def test_what_is_no_fault_of_the_recording_stays_and_is_said(corrected):
+    one = corrected(GAIN[0], causes=[("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0])])
+    assert one.is_as_it_was()
     why = "added_mass hand_r: no fault of the plates, the clocks, the axes or the labels"
-    assert f"{STEM}: not corrected: {why}" in said
-    assert "sub-01_task-static: nothing to correct" in said
-    assert (path.parents[1] / "participants.tsv").exists()
+    assert f"{STEM}: not corrected: {why}" in one.said
+    assert "sub-01_task-static: nothing to correct" in one.said
+    assert (one.path.parents[1] / "participants.tsv").exists()
 
 
-def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(GAIN[1], alike=[("added_mass", "hand_r")])
-    path = study.exported()
-    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
-    said = capsys.readouterr().err
-    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
+def test_what_cannot_be_told_from_another_cause_stays(corrected):
+    one = corrected(GAIN[0], causes=[GAIN[1]], alike=[("added_mass", "hand_r")])
+    assert one.is_as_it_was()
+    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in one.said
 
 
 @pytest.mark.parametrize(
@@ -437,11 +442,8 @@ def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
         ("marker_shift", "T10", "marker_shift T10: one of several causes"),
     ],
 )
-def test_what_the_diagnosis_did_not_size_is_said(hide, capsys, effect, target, said):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[(effect, target)])
-    study.exported()
-    assert said in capsys.readouterr().err
+def test_what_the_diagnosis_did_not_size_is_said(corrected, effect, target, said):
+    assert said in corrected(GAIN[0], alike=[(effect, target)]).said
 
 
 def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size():
@@ -449,48 +451,38 @@ def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size():
     assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
-def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
-    study = hide(ZERO[0])
-    study.diagnosed_as(ZERO[1], alike=[("plate_zero", "1 fz")])
-    before, after = both(study, study.exported())
+def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(corrected):
+    one = corrected(ZERO[0], causes=[ZERO[1]], alike=[("plate_zero", "1 fz")])
+    before, after = one.both()
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
-    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in (
-        capsys.readouterr().err
-    )
+    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in one.said
 
 
 @pytest.mark.parametrize("rejected", [(), (Number("gain", "1", 0.01, 0.0, 0.1),)])
-def test_the_size_is_said_with_its_interval(hide, capsys, rejected):
+def test_the_size_is_said_with_its_interval(corrected, rejected):
     """Not a rejected one: what the laboratory has is looked for in each person once more."""
-    study = hide(GAIN[0])
     found = (Number("gain", "1", 0.06, 0.0552, 0.0657),)
-    study.diagnosed_as(GAIN[1], numbers=found, rejected=rejected)
-    path = study.exported()
+    one = corrected(GAIN[0], causes=[GAIN[1]], numbers=found, rejected=rejected)
     said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
-    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
-    entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
+    assert f"{STEM}: corrected: {said}" in one.said
+    entry = ezc3d.c3d(str(one.path))["parameters"]["BSIP"]["CORRECTED"]["value"]
     assert said in entry
 
 
-def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(hide, capsys):
+def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(corrected):
     """The same fault twice, in the same trials, with two sizes."""
-    study = hide(GAIN[0])
     larger, smaller = (*GAIN[1][:2], [0.04]), (*GAIN[1][:2], [0.02])
     both_sizes = Number("gain", "1", 0.04, 0.03, 0.05), Number("gain", "1", 0.02, 0.01, 0.03)
-    study.diagnosed_as(larger, smaller, numbers=both_sizes)
-    study.exported()
-    said = capsys.readouterr().err
+    said = corrected(GAIN[0], causes=[larger, smaller], numbers=both_sizes).said
     for size in ("4.0 % (95 % interval 3.0 to 5.0)", "2.0 % (95 % interval 1.0 to 3.0)"):
         assert f"{STEM}: corrected: plate_gain 1 fz: gain {size} taken off" in said
 
 
-def test_the_size_that_is_told_is_taken_off(hide):
+def test_the_size_that_is_told_is_taken_off(corrected):
     """``extend`` leaves a person's own recordings out of what the laboratory tells; the sentence
     does not."""
-    study = hide(GAIN[0])
-    own = (*GAIN[1][:2], [0.07])
-    study.diagnosed_as(own, numbers=(Number("gain", "1", 0.06, 0.05, 0.07),))
-    before, after = both(study, study.exported())
+    own, told = (*GAIN[1][:2], [0.07]), Number("gain", "1", 0.06, 0.05, 0.07)
+    before, after = corrected(GAIN[0], causes=[own], numbers=(told,)).both()
     assert np.abs(wrenches(after) - wrenches(before))[..., :3].max() < 0.05
 
 

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -103,6 +103,21 @@ class Bench:
         found = files_of(out)
         names = sorted(found.keys() | self.whole.keys())
         return [name for name in names if found.get(name) != self.whole.get(name)]
+
+
+UPSTREAM = {"ingest": (), "regress": ("ingest", "scale")}
+"""Cheap stages whose calls fail, and what is upstream of them."""
+
+
+def benches(run: Run, folder: Path, names: Sequence[str]) -> Iterator[Bench]:
+    """Each stage where its results are not there yet, and where they are and are made again."""
+    study = make_study(folder / "study", participants=1)
+    for name in names:
+        before = folder / f"before_{name}"
+        for stage in UPSTREAM[name]:
+            run(study, before, (stage,), {})
+        yield Bench.of(run, study, before, name)
+        yield Bench.of(run, study, before.with_name(f"{before.name}_whole_{name}"), name, "--force")
 
 
 def by_processes(

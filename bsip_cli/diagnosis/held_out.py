@@ -156,8 +156,9 @@ def _means(
 # itself or more has another cause, which no catalogue knows.
 
 _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault differs
-# Steps, of itself: what begins late in a trial is so many times its mean. The spreads overlap.
-_STEPS, _SPREAD = np.geomspace(0.3, 3.0, 5), 0.3
+# A step, of itself: what begins or ends within a trial changes by its mean at least. The spreads
+# overlap.
+_STEPS, _SPREAD = np.geomspace(1.0, 3.0, 3), 0.3
 
 
 class Uneven(Nameless):
@@ -203,7 +204,7 @@ def can_be_uneven(effect: Effect) -> bool:
 
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
     """Logarithm of the Bayes factor of a size that is not the same throughout, against one size:
-    it differs from block to block, or is another one from a block of a trial on.
+    it differs from block to block, or is there from a block of a trial on, or until then.
 
     inflation (T,) : the trials' likelihoods count by so much less.
     """
@@ -220,20 +221,32 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
         shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)
     gram, pull = block_diag(*grams) - taken.T @ taken, np.concatenate(pulls)
-    throughout = gram.sum(axis=1) / np.sqrt(gram.sum())  # of another size in all blocks: the fault
-    pull = pull - throughout * pull.sum() / np.sqrt(gram.sum())
-    gram = gram - np.outer(throughout, throughout)
-    values, vectors = np.linalg.eigh(gram)
-    along, added = vectors.T @ pull, 1 + _SHARES[:, None] ** 2 * np.maximum(values, 0.0)
-    everywhere = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
-    some, first = 0.0, 0  # logarithm of the sum over all choices of trials in which a step is
+    within: list[float] = []  # logarithms of the Bayes factors of a step in each trial
+    first = 0
     for count in map(len, pulls):
         mine = slice(first, first := first + count)
-        later = np.tril(np.ones((count, count)))
-        information = np.diag(later.T @ gram[mine, mine] @ later)
-        some += float(np.logaddexp(0.0, _mean(_of_steps(later.T @ pull[mine], information))))
-    steps = some + np.log(-np.expm1(-some)) - np.log(2.0 ** len(pulls) - 1)  # but for none
-    return _mean(np.array([_mean(everywhere), steps]))
+        if count > 1:
+            own_pull, own_gram = _beside_the_mean(pull[mine], gram[mine, mine])
+            later = np.tril(np.ones((count, count)))[:, 1:]
+            information = np.diag(later.T @ own_gram @ later)
+            within.append(_mean(_of_steps(later.T @ own_pull, information)))
+    pull, gram = _beside_the_mean(pull, gram)
+    values, vectors = np.linalg.eigh(gram)
+    along, added = vectors.T @ pull, 1 + _SHARES[:, None] ** 2 * np.maximum(values, 0.0)
+    shares = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
+    everywhere = _mean(shares)
+    if not within:
+        return everywhere
+    some = float(np.logaddexp(0.0, within).sum())  # of all choices of trials with a step
+    steps = some + np.log(-np.expm1(-some)) - np.log(2.0 ** len(within) - 1)  # but for none
+    return _mean(np.array([everywhere, steps]))
+
+
+def _beside_the_mean(pull: np.ndarray, gram: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pull (b,) and information (b, b) of blocks, whatever size they share: it is the fault's."""
+    shared = gram.sum(axis=1)
+    weight = max(float(gram.sum()), 1e-9)
+    return pull - shared * pull.sum() / weight, gram - np.outer(shared, shared) / weight
 
 
 def _of_steps(pull: np.ndarray, information: np.ndarray) -> np.ndarray:

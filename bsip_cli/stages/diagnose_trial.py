@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 
@@ -42,15 +40,6 @@ def run(unit: Unit) -> None:
 _STEP = 1e-3  # of the typical size
 
 
-@dataclass(frozen=True)
-class SharedFinding(Finding):
-    """A fault of the laboratory that so many persons share; ``own``: its largest number by this
-    person's recordings alone, None where they say nothing of it."""
-
-    persons: int = 0
-    own: Number | None = None
-
-
 def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFrame:
     """One row per parameter; where nothing is named in the trials that were analysed, a first row
     that says so."""
@@ -64,8 +53,7 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
         gain = zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)
         known: dict = {name: getattr(one, name) for name in of_all} | dict(gain)
         known |= {"rank": rank, "trials": ", ".join(one.trials)}
-        persons, own = (one.persons, one.own) if isinstance(one, SharedFinding) else (0, None)
-        known["persons"] = persons
+        own, known["persons"] = one.own, one.persons
         for x in one.numbers:
             sizes = {"estimate": x.value, "unit": x.unit, "ci_low": x.low, "ci_high": x.high}
             alone = own if own and own.name == x.name else Number(x.name, x.unit, np.nan)

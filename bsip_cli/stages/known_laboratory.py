@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.fault_model import FaultTrial
-from bsip_cli.diagnosis.findings import Number, interval_words
+from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
 from bsip_cli.diagnosis.shared_faults import (
     OF_A_LABORATORY,
@@ -24,7 +24,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Parameter, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.diagnose_trial import SharedFinding, cause_record
+from bsip_cli.stages.diagnose_trial import cause_record
 from bsip_cli.statistics.samples import Z95
 
 _KEY = ("effect", "target", "parameter", "standing")
@@ -47,7 +47,7 @@ class Known:
     def given_to(self, trial: FaultTrial, standing: bool) -> FaultTrial:
         return with_known(trial, standing, self.coordinates, self.mean, self.root)
 
-    def findings(self, trials: Sequence[FaultTrial]) -> Iterator[SharedFinding]:
+    def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""
         named = self.rows[self.rows["verdict"] == "named"]
         for (name, target), rows in named.groupby(["effect", "target"], sort=False):
@@ -59,7 +59,7 @@ class Known:
                 words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
                 known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
                 own = self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
-                yield SharedFinding(
+                yield Finding(
                     effect.name,
                     str(target),
                     tuple(one.name for one in held),

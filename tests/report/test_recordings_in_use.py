@@ -29,7 +29,7 @@ from bsip_cli.report.recordings import (
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import cause_line, cause_text, consequences
-from bsip_cli.stages.diagnose_trial import SharedFinding, rows_of
+from bsip_cli.stages.diagnose_trial import rows_of
 from bsip_cli.stages.report import record_of
 from tests.report.fake_study import Artifacts, diagnosis
 
@@ -349,7 +349,7 @@ def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
     sizes = Number("y", "m", 0.001), Number("x", "m", 0.02, 0.019, 0.021)
     own = Number("x", "m", 0.018, 0.01, 0.026)
     said = sizes, "plate 1 is shifted", 0.01, 0.99
-    shared = SharedFinding("plate_translation", "1", (SEQUENCE,), *said, persons=7, own=own)
+    shared = Finding("plate_translation", "1", (SEQUENCE,), *said, persons=7, own=own)
     mine = Finding("plate_translation", "2", (SEQUENCE,), *said)
     first, second = candidates_of(rows_of((shared, mine), (SEQUENCE,)))
     assert first.persons == 7 and vars(first.own) == vars(own)

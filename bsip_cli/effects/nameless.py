@@ -173,24 +173,62 @@ class Course(Nameless):
         return np.asarray(self.tangent(scene, target, values) @ values)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        which, quantity = target.split(" by ")
-        what = ("the force", "the moment") if which == _ALL else (OF_THE_LAB[which],)
-        sizes = self.reported(scene, target, values)
-        errors = (
-            f"{x} by {size:.1f} {unit}" for x, (_, unit, size) in zip(what, sizes, strict=True)
+        _, quantity = target.split(" by ")
+        errors = _in_words(self.sizes(scene, target, values))
+        return (
+            f"of unknown cause: an error of {errors} (RMS) that goes along with {ALONG[quantity]}"
         )
-        along = f"(RMS) that goes along with {ALONG[quantity]}"
-        return f"of unknown cause: an error of {' and '.join(errors)} {along}"
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        change = self.change(scene, target, values)[scene.valid]
-        square = (move_moments(change, place_of_stance_m(scene)) ** 2).mean(axis=0)
-        channels = self.channels(target)
-        if len(channels) == 1:
-            size = float(np.sqrt(square[CHANNELS.index(channels[0])]))
-            return (("error", unit_of(channels[0]), size),)
-        force, moment = np.sqrt(square.reshape(2, 3).sum(axis=1)).tolist()
-        return ("force", "N", force), ("moment", "N m", moment)
+        return _of_few(self.sizes(scene, target, values))
+
+    def sizes(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, float]:
+        """Of each of its components, RMS."""
+        change = move_moments(self.change(scene, target, values), place_of_stance_m(scene))
+        each = np.sqrt((change[scene.valid] ** 2).mean(axis=0)).tolist()
+        return {x: each[CHANNELS.index(x)] for x in self.channels(target)}
+
+
+class Mean(Nameless):
+    """The constant of a `Course`, which nobody would take for a fault of its own: it has no name
+    either. sizes : by which the components vary, each about as large as its mean may be."""
+
+    def __init__(self, sizes: Mapping[str, float]) -> None:
+        self.sizes = sizes
+
+    @staticmethod
+    def target_of(course: str) -> str:
+        """Of the constant of a `Course` with this target."""
+        return f"{course.split(' by ')[0]} by mean"
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return tuple(Parameter(x, unit_of(x), -1e3, 1e3, size) for x, size in self.sizes.items())
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        constant = np.zeros((len(scene.times_s), 6))
+        constant[:, [CHANNELS.index(x) for x in self.sizes]] = values
+        return move_moments(constant, -place_of_stance_m(scene))
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        errors = _in_words(dict(zip(self.sizes, values.tolist(), strict=True)))
+        return f"of unknown cause: a constant error of {errors}"
+
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        return _of_few(dict(zip(self.sizes, values.tolist(), strict=True)))
+
+
+def _of_few(sizes: Mapping[str, float]) -> Reported:
+    """One component as it is, all as force and moment."""
+    if len(sizes) == 1:
+        return tuple(("error", unit_of(x), size) for x, size in sizes.items())
+    force, moment = np.linalg.norm(np.reshape(list(sizes.values()), (2, 3)), axis=1).tolist()
+    return ("force", "N", force), ("moment", "N m", moment)
+
+
+def _in_words(sizes: Mapping[str, float]) -> str:
+    what = ("the force", "the moment") if len(sizes) > 1 else map(OF_THE_LAB.__getitem__, sizes)
+    numbers = (f"{size:.1f} {unit}" for _, unit, size in _of_few(sizes))
+    return " and ".join(f"{x} by {number}" for x, number in zip(what, numbers, strict=True))
 
 
 def _quantities(scene: Scene) -> Mapping[str, np.ndarray]:

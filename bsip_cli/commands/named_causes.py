@@ -9,11 +9,11 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.diagnosis.cause import Cause, is_fault_of_forces
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import Turned
 from bsip_cli.effects.markers import MarkerSwap
+from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.plates import ALL, FrameRate, PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit

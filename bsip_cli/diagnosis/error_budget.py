@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from bsip_cli.diagnosis.error_model import ErrorModel, Part
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.plates import OF_THE_LAB
 from bsip_cli.statistics.choice import ErrorGain, block_errors, error_gain, pooled
 from bsip_cli.statistics.samples import Z95, effective_samples

@@ -264,12 +264,14 @@ def smoothing_bias(scene: Scene) -> np.ndarray:
 
 
 def _swinging_body(scene: Scene) -> np.ndarray:
-    """(N, 6, 2) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is."""
+    """(N, 6, 7) if all soft tissue swings at SKIN_HZ: the wrench as far behind as tissue is, each
+    component by itself, since tissue is not held alike in all directions; and as late in all."""
     place = place_of_stance_m(scene)
     signal = move_moments(scene.predicted, place)
     bent = np.gradient(np.gradient(signal, axis=0), axis=0) * scene.rate_hz**2
-    behind = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)
-    return np.stack([-move_moments(one, -place) for one in behind], axis=-1)
+    behind, later = np.moveaxis(stays_behind(bent, scene.rate_hz), -1, 0)
+    columns = (*(behind * axis for axis in np.eye(6)), later)
+    return np.stack([-move_moments(one, -place) for one in columns], axis=-1)
 
 
 def noise_of_instruments(

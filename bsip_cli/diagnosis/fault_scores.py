@@ -15,8 +15,8 @@ from scipy.stats import chi2
 
 from bsip_cli.diagnosis.fault_model import SIZES, FaultTrial, Fitted, Session
 from bsip_cli.diagnosis.hypothesis import Candidate, candidates_of
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.scene import Scene
 
 _BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
@@ -28,7 +28,7 @@ _UNDETERMINED = (
 _DETERMINED = (
     1e-5  # of what the likeliest combination of parameters is determined: less is rounding
 )
-_MEDIANS = [np.nan, *chi2.median(np.arange(1, 20))]
+_MEDIANS = [np.nan, *chi2.median(np.arange(1, 50))]
 
 
 @dataclass(frozen=True)

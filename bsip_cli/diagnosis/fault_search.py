@@ -20,8 +20,8 @@ from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, r
 from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
 from bsip_cli.diagnosis.held_out import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.nameless import UNEXPLAINED, Course, Mean
 
 _TRIED = 8  # candidates of a round that are fitted in full
 _OF_A_KIND = 2  # of them, of the same effect
@@ -159,6 +159,7 @@ def _verdict(
     mine = {one.key: Tried(one, again, _prior_of(library, one))}
     for other in _in_full(session, library, without, set(one.trials)):
         mine.setdefault(other.fault.key, other)
+    mine |= {other.fault.key: other for other in _means_of_nameless(without, one)}
     mine = {key: x.weighed(without, inflation) for key, x in mine.items()}
     odds = library.prior_odds
     if any(x.effect.name == UNEXPLAINED and set(x.trials).isdisjoint(one.trials) for x in others):
@@ -166,7 +167,8 @@ def _verdict(
         for key, x in mine.items():
             if x.fault.effect.name == UNEXPLAINED:
                 mine[key] = replace(x, log_odds=x.log_odds - np.log(library.prior_odds))
-    weighed = [each for x in mine.values() for each in x.evenly_or_not(inflation, odds)]
+    others_evenly = (x for key, x in mine.items() if key != one.key)
+    weighed = [*mine[one.key].evenly_or_not(inflation, odds), *others_evenly]
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
@@ -180,6 +182,24 @@ def _verdict(
     members = tuple((each, share * there) for each, share in ranked[:count])
     rest = tuple((each.fault, share * there) for each, share in ranked[count:])
     return Verdict(number, members, rest, there, without)
+
+
+def _means_of_nameless(without: Fitted, one: Hypothesis) -> Iterator[Tried]:
+    """What errors without a name in a fault's trials are on average, if not zero: no fault is
+    needed for it, so nothing is rare about it."""
+    if one.effect.name == UNEXPLAINED:
+        return
+    for number, other in enumerate(without.faults):
+        if not isinstance(other.effect, Course) or set(one.trials).isdisjoint(other.trials):
+            continue
+        values = without.values_at(number, without.mean)
+        scene, target = other.scene(without.session), Mean.target_of(other.target)
+        sizes = other.effect.sizes(scene, other.target, values)
+        fault = Hypothesis(Mean(sizes), target, other.trials, np.zeros(len(sizes)))
+        if (fit := _with_one_more(without, without, fault)) is not None:
+            size, scale = (x[fit.coefficients(-1)] for x in (fit.mean, fit.root))
+            prior = float((0.5 * (size / scale) ** 2 - 0.5 * size**2 + np.log(scale)).sum())
+            yield Tried(fit.faults[-1], fit, prior)
 
 
 def _prior_of(library: Library, one: Hypothesis) -> float:
@@ -241,11 +261,12 @@ def _chosen(
 ) -> Iterator[list[int]]:
     """The likeliest kinds of places, each with its values of a scan; no effect takes all of them.
 
-    Where a regularity without a name is in the model already nothing more can be named: what it
-    leaves has no name either.
+    Where an error without a name is in the model already nothing more can be named: what it leaves
+    has no name either. What stands beside it may be another of the named ones.
     """
     known = {(*one.key, t) for one in fit.faults for t in one.trials}
-    closed = {t for one in fit.faults if one.effect.name == UNEXPLAINED for t in one.trials}
+    unnamed = (one for one in fit.faults if one.effect.name == UNEXPLAINED)
+    closed = {t for one in unnamed for t in one.trials} if asked is None else set()
     kinds: dict[tuple[Effect, str, tuple[int, ...]], list[int]] = {}
     for k, place in enumerate(library.places):
         effect, target, trials = place.kind

@@ -42,6 +42,8 @@ class Finding:
     p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
     white residual on data held out, and its interval. scope : laboratory, person or trial.
     rms_change : root mean square of what it does to the component that it changes most [N, N m].
+    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
+    this person's recordings alone, None where they say nothing of a shared one.
     """
 
     effect: str
@@ -56,6 +58,8 @@ class Finding:
     scope: str = "trial"
     gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
     rms_change: float = np.nan
+    persons: int = 0
+    own: Number | None = None
 
 
 def scope_of(effect: Effect) -> str:

@@ -12,8 +12,8 @@ from scipy.special import logsumexp
 
 from bsip_cli.diagnosis.error_model import posterior
 from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
-from bsip_cli.diagnosis.patterns import UNEXPLAINED, Nameless
 from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.nameless import UNEXPLAINED, Nameless
 from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
 
@@ -156,6 +156,9 @@ def _means(
 # itself or more has another cause, which no catalogue knows.
 
 _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault differs
+# A step, of itself: what begins or ends within a trial changes by its mean at least. The spreads
+# overlap.
+_STEPS, _SPREAD = np.geomspace(1.0, 3.0, 3), 0.3
 
 
 class Uneven(Nameless):
@@ -200,7 +203,8 @@ def can_be_uneven(effect: Effect) -> bool:
 
 
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
-    """Logarithm of the Bayes factor of a size that differs from block to block, against one size.
+    """Logarithm of the Bayes factor of a size that is not the same throughout, against one size:
+    it differs from block to block, or is there from a block of a trial on, or until then.
 
     inflation (T,) : the trials' likelihoods count by so much less.
     """
@@ -216,8 +220,47 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
         grams.append(white.T @ white / inflation[t])
         shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)
-    values, vectors = np.linalg.eigh(block_diag(*grams) - taken.T @ taken)
-    along, values = vectors.T @ np.concatenate(pulls), np.maximum(values, 0.0)
-    added = 1 + _SHARES[:, None] ** 2 * values
-    logs = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
-    return float(logsumexp(logs) - np.log(len(logs)))
+    gram, pull = block_diag(*grams) - taken.T @ taken, np.concatenate(pulls)
+    within: list[float] = []  # logarithms of the Bayes factors of a step in each trial
+    first = 0
+    for count in map(len, pulls):
+        mine = slice(first, first := first + count)
+        if count > 1:
+            own_pull, own_gram = _beside_the_mean(pull[mine], gram[mine, mine])
+            later = np.tril(np.ones((count, count)))[:, 1:]
+            information = np.diag(later.T @ own_gram @ later)
+            within.append(_mean(_of_steps(later.T @ own_pull, information)))
+    pull, gram = _beside_the_mean(pull, gram)
+    values, vectors = np.linalg.eigh(gram)
+    along, added = vectors.T @ pull, 1 + _SHARES[:, None] ** 2 * np.maximum(values, 0.0)
+    shares = 0.5 * (_SHARES[:, None] ** 2 * along**2 / added - np.log(added)).sum(axis=1)
+    everywhere = _mean(shares)
+    if not within:
+        return everywhere
+    some = float(np.logaddexp(0.0, within).sum())  # of all choices of trials with a step
+    steps = some + np.log(-np.expm1(-some)) - np.log(2.0 ** len(within) - 1)  # but for none
+    return _mean(np.array([everywhere, steps]))
+
+
+def _beside_the_mean(pull: np.ndarray, gram: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pull (b,) and information (b, b) of blocks, whatever size they share: it is the fault's."""
+    shared = gram.sum(axis=1)
+    weight = max(float(gram.sum()), 1e-9)
+    return pull - shared * pull.sum() / weight, gram - np.outer(shared, shared) / weight
+
+
+def _of_steps(pull: np.ndarray, information: np.ndarray) -> np.ndarray:
+    """Logarithms of the Bayes factors of steps of all sizes, up and down, against none, from their
+    pull (b,) and information (b,)."""
+    information = np.maximum(information, 1e-9)
+    found, variance = pull / information, 1 / information
+    size = np.concatenate([_STEPS, -_STEPS])[:, None]
+    total = variance + (_SPREAD * size) ** 2
+    return np.asarray(
+        0.5 * (found**2 / variance - (found - size) ** 2 / total - np.log(total / variance))
+    )
+
+
+def _mean(logs: np.ndarray) -> float:
+    """Logarithm of the mean of what has these logarithms."""
+    return float(logsumexp(logs) - np.log(logs.size))

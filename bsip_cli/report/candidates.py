@@ -24,10 +24,7 @@ UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
 _ADVICE = re.compile(r"; ([^;]* look alike here: )?to distinguish them, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
-_OF_ALL = re.compile(  # what the laboratory is known to have, and what this person alone shows
-    r"; this is known from the laboratory \((?P<persons>\d+)[^()]*\)"
-    r"(?:, and this person's recordings alone (?P<how>also show it|leave it open): (?P<own>.*))?"
-)
+_OF_ALL = "; this is known from the laboratory"  # what follows it too
 _REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
 _SIGNED = re.compile(r"[+−]\d")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
@@ -54,6 +51,12 @@ class Number:
         digits = digits_of(high - low if high > low else factor * self.value)
         return with_unit(f"{number(low, digits)} to {number(high, digits)}", unit)
 
+    def size(self) -> str:
+        """``1.99°``, with the digits of its interval."""
+        factor, unit = readable_unit(self.name, self.unit)
+        digits = digits_of(factor * (self.high - self.low))
+        return with_unit(number(factor * self.value, digits), unit)
+
     def certainty(self) -> float:
         """Its size over the width of its interval; 0 where none is known."""
         width = self.high - self.low
@@ -66,6 +69,8 @@ class Candidate:
 
     probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
     or trial. rms_change : what it does to the component that it changes most [N or N m].
+    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
+    this person's recordings alone, where they say something of a shared one.
     """
 
     effect: str
@@ -79,34 +84,37 @@ class Candidate:
     sentence: str
     trials: tuple[str, ...]
     numbers: tuple[Number, ...]
+    persons: int
+    own: Number | None
 
     @property
     def label(self) -> str:
         """``force plate turned or tilted: plate 1``."""
         where = effect_words.place_label(self.effect, self.target)
-        if self.effect == UNNAMED and self.numbers and self.target:
-            where = effect_words.unnamed_label(self.numbers[0].name, where)
         return effect_words.effect_title(self.effect) + (f": {where}" if where else "")
 
     @property
     def is_of_all(self) -> bool:
         """The laboratory's, as all its persons together show it."""
-        return bool(_OF_ALL.search(self.sentence))
+        return self.persons > 0
 
     def which_size(self, short: bool = False) -> str:
         """Of a fault of the laboratory, why its size is the one to correct with, and this person's
         own; empty of all others. ``short``: without the interval of that."""
-        found = _OF_ALL.search(self.sentence)
-        if not found:
+        if not self.is_of_all:
             return ""
-        own = (found["own"] or "").partition(", ")[0] if short else found["own"]
-        alone = f" (this person alone: {true_minus(own)})" if own else ""
-        persons = found["persons"]
-        return f"Correct with this size, as {persons} persons of the laboratory share it{alone}."
+        alone = ""
+        if self.own:
+            interval = "" if short else f", 95 % interval {self.own.interval()}"
+            alone = f" (this person alone: {self.own.size()}{interval})"
+        return (
+            f"Correct with this size, as {self.persons} persons of the laboratory share it{alone}."
+        )
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
-        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", re.sub(_OF_ALL, "", self.sentence)))
+        text = self.sentence.partition(_OF_ALL)[0]
+        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", text))
         text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return true_minus(text)
@@ -164,6 +172,11 @@ def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
         for r in rows
         if r["parameter"]
     )
+    alone = (
+        Number(r["parameter"], r["unit"], r["own_estimate"], r["own_low"], r["own_high"])
+        for r in rows
+        if isfinite(r["own_estimate"])
+    )
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))
     return Candidate(
         first["effect"],
@@ -177,6 +190,8 @@ def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
         first["sentence"],
         tuple(str(first["trials"]).split(", ")),
         numbers,
+        int(first["persons"]),
+        next(alone, None),
     )
 
 

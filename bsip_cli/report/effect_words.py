@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
+from bsip_cli.effects.nameless import ALONG
 from bsip_cli.effects.plates import plates_called
 from bsip_cli.report.words import TEXTS, listing, number, segment_label
 from bsip_cli.segments import SEGMENTS
@@ -68,8 +69,14 @@ def place_label(effect: str, target: str) -> str:
     """``plate 1, force x into force y`` or ``left hand`` of an effect's target; empty for none."""
     if effect in _ONE_PLACE:
         return ""
-    if effect.startswith("plate_"):  # 1 fx>fy, 1 fz or 1
-        plate, _, channels = target.partition(" ")
+    component, by, quantity = target.partition(" by ")
+    if by:  # fz by load
+        which = _WORDS["channels"].get(component, "all components")
+        return f"{which}, " + (
+            f"along with {ALONG[quantity]}" if quantity in ALONG else "on average"
+        )
+    plate, _, channels = target.partition(" ")  # 1 fx>fy, 1 fz or 1
+    if effect.startswith("plate_") or plate.isdigit():
         words = " into ".join(_WORDS["channels"].get(one, one) for one in channels.split(">"))
         return f"{plates_called(plate)}, {words}" if words else plates_called(plate)
     if effect.startswith("marker_"):
@@ -79,17 +86,6 @@ def place_label(effect: str, target: str) -> str:
     if effect == "joint_centre" or all(part in SEGMENTS for part in parts):
         return " and ".join(segment_label(part) for part in parts)
     return _WORDS["channels"].get(target, target)
-
-
-def unnamed_label(number_name: str, where: str) -> str:
-    """``swing, force x``; of a pull, ``y by z`` is the force's axis and the place's."""
-    kind = _WORDS["regularities"].get(number_name)
-    if kind is None:
-        return where
-    force, by, place = where.partition(" by ")
-    return (
-        f"{kind} along {force.upper()}, growing along {place.upper()}" if by else f"{kind}, {where}"
-    )
 
 
 _COMPLETE = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open

@@ -20,8 +20,8 @@ from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
 from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
-from bsip_cli.diagnosis.patterns import PATTERNS, UNEXPLAINED
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
 from bsip_cli.report.candidates import candidates_of, causes_of
 from bsip_cli.report.errors import term_words
 from bsip_cli.report.verdict import cause_line, verdict_of
@@ -32,7 +32,7 @@ from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.known_laboratory import Known, known_laboratory
 from bsip_cli.stages.reconstruct import scale_of
 
-ASKED = (*CATALOGUE, *PATTERNS)
+ASKED = (*CATALOGUE, *NAMELESS)
 
 
 def run(unit: Unit) -> None:

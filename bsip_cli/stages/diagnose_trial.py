@@ -53,8 +53,11 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
         gain = zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)
         known: dict = {name: getattr(one, name) for name in of_all} | dict(gain)
         known |= {"rank": rank, "trials": ", ".join(one.trials)}
+        own, known["persons"] = one.own, one.persons
         for x in one.numbers:
             sizes = {"estimate": x.value, "unit": x.unit, "ci_low": x.low, "ci_high": x.high}
+            alone = own if own and own.name == x.name else Number(x.name, x.unit, np.nan)
+            sizes |= {"own_estimate": alone.value, "own_low": alone.low, "own_high": alone.high}
             rows.append(known | {"parameter": x.name} | sizes)
     return table_of("overall-diagnosis", rows)
 

@@ -388,10 +388,10 @@ def _table(
         np.where(ok, np.hypot(sd, of_motion[..., None]), np.nan)
         for sd, of_motion in zip((loads.force_sd_N, loads.moment_sd_Nm), noise, strict=True)
     )
-    rate = loads.rate_rad_s[..., None]
+    power = replace(loads, moment_Nm=moment).power_W
+    power_sd = moment_sd * np.abs(loads.rate_rad_s[..., None])
     numbers = {"force_N": force, "force_sd_N": force_sd, "moment_Nm": moment}
-    numbers |= {"moment_sd_Nm": moment_sd, "power_W": moment * rate}
-    numbers |= {"power_sd_W": moment_sd * np.abs(rate), "valid": ok}
+    numbers |= {"moment_sd_Nm": moment_sd, "power_W": power, "power_sd_W": power_sd, "valid": ok}
     keys = [(m, joint, axis) for m in methods for joint in loads.joints for axis in axes_of(joint)]
     words = {
         name: pd.Categorical(each, list(dict.fromkeys(each))).repeat(len(trial.times_s))

@@ -58,21 +58,22 @@ class Known:
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
                 words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
                 known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
-                known += self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
+                own = self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
                 yield Finding(
                     effect.name,
                     str(target),
                     tuple(one.name for one in held),
                     numbers,
-                    words + interval_words(numbers) + known,
+                    words + interval_words(numbers) + known + _own_words(own, rows),
                     1 - float(first["probability"]),
                     float(first["probability"]),
                     scope="laboratory",
+                    persons=int(first["persons"]),
+                    own=own,
                 )
 
-    def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> str:
-        """Whether this person's recordings show a fault too, by its largest number; empty where
-        they say nothing of it."""
+    def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> Number | None:
+        """A fault's largest number by this person's recordings; None where they say nothing."""
         sizes = dict(zip(rows["parameter"], rows["estimate"], strict=True))
         first = rows.iloc[0]
         known = [
@@ -81,20 +82,10 @@ class Known:
             if (at := Coordinate(first["effect"], first["target"], p.name)) in self.own
         ]
         if not known:
-            return ""
+            return None
         _, parameter, (mean, sd) = max(known, key=itemgetter(0))
-        low, high = mean - Z95 * sd, mean + Z95 * sd
-        is_shown = low * high > 0 and mean * sizes[parameter.name] > 0
-        how = "also show it" if is_shown else "leave it open"
-        factor, unit = readable_unit(parameter.name, parameter.unit)
-        ends = [factor * parameter.typical * x for x in (mean, low, high)]
-        digits = digits_of(ends[2] - ends[1])
-        size, least, most = (f"{x:.{digits}f}" for x in ends)
-        shown = with_unit(size, unit)
-        return (
-            f", and this person's recordings alone {how}: {shown}, 95 % interval "
-            f"{with_unit(f'{least} to {most}', unit)}"
-        )
+        ends = [parameter.typical * x for x in (mean, mean - Z95 * sd, mean + Z95 * sd)]
+        return Number(parameter.name, parameter.unit, *ends)
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
@@ -138,6 +129,22 @@ class Known:
         smaller = np.fmin(own["limit"].to_numpy(), theirs.reindex(both).to_numpy())
         together = own["trials"].str.count(",")
         return own.assign(limit=np.where(together == together.max(), smaller, own["limit"]))
+
+
+def _own_words(own: Number | None, rows: pd.DataFrame) -> str:
+    """Whether this person's recordings show a fault too."""
+    if own is None:
+        return ""
+    (known,) = rows.loc[rows["parameter"] == own.name, "estimate"]
+    is_shown = own.low * own.high > 0 and own.value * known > 0
+    how = "also show it" if is_shown else "leave it open"
+    factor, unit = readable_unit(own.name, own.unit)
+    digits = digits_of(factor * (own.high - own.low))
+    size, least, most = (f"{factor * x:.{digits}f}" for x in (own.value, own.low, own.high))
+    return (
+        f", and this person's recordings alone {how}: {with_unit(size, unit)}, 95 % interval "
+        f"{with_unit(f'{least} to {most}', unit)}"
+    )
 
 
 def _of_all(target: str) -> str:

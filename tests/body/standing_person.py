@@ -6,11 +6,13 @@ simulator: the person is calibrated from the marker positions below, the motions
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
 
+from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
@@ -123,6 +125,13 @@ def joint_frames(person: Person, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         R.append([placement.rotation.copy() for placement in placements])
         p.append([placement.translation.copy() for placement in placements])
     return np.array(R), np.array(p)
+
+
+def parameters_of(person: Person, inertias: Sequence[Inertia]) -> np.ndarray:
+    """(10 n,) of the segments with mass, about the joint centres."""
+    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
+    moved = zip(inertias, origins, strict=True)
+    return np.concatenate([inertia.moved(-origin).phi() for inertia, origin in moved])
 
 
 def markers_of(person: Person, q: np.ndarray) -> np.ndarray:

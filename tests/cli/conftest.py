@@ -38,6 +38,23 @@ def bsip() -> Callable[..., Answer]:
 
 
 @pytest.fixture
+def failing(monkeypatch) -> Callable[[str, Callable[[Path], bool], OSError], None]:
+    """Makes a method of ``Path`` raise for the paths of which something holds."""
+
+    def make(method: str, of: Callable[[Path], bool], error: OSError) -> None:
+        sound = getattr(Path, method)
+
+        def fail(path: Path, *arguments, **options):
+            if of(path):
+                raise error
+            return sound(path, *arguments, **options)
+
+        monkeypatch.setattr(Path, method, fail)
+
+    return make
+
+
+@pytest.fixture
 def empty_study(tmp_path) -> Path:
     """Two participants whose recordings hold nothing."""
     root = tmp_path / "study"

@@ -94,11 +94,22 @@ def test_a_signal_that_other_code_catches_ends_the_run_all_the_same(
     assert not list(tmp_path.rglob("*_refusal-*"))
 
 
-def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def exit_code(stage, empty_study, tmp_path, monkeypatch):
+    """Runs stages of these names on the participants, as `bsip run` does."""
+
+    def of(*names: str) -> int:
+        stages = tuple(stage(name, "participant") for name in names)
+        monkeypatch.setattr(session, "stages_named", lambda name: stages)
+        out = tmp_path / "out"
+        return session.run_session("run", empty_study, out, (), None, jobs=1, force=True)
+
+    return of
+
+
+def test_exit_code_and_words_of_a_session(exit_code, capsys):
     """The bug is graver than the other's numerical failure."""
-    stages = (stage("faulty", "participant"), stage("numeric", "participant"))
-    monkeypatch.setattr(session, "stages_named", lambda name: stages)
-    code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
+    code = exit_code("faulty", "numeric")
     told = capsys.readouterr()
     assert code == 1
     assert told.out == ""
@@ -107,23 +118,19 @@ def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypa
     assert told.err.splitlines()[-1].startswith("bsip run: 1 done, 2 refused, 1 failed by a bug; ")
 
 
-def test_numerical_failure_is_code_4(stage, empty_study, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(session, "stages_named", lambda name: (stage("numeric", "participant"),))
-    code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
-    assert code == 4
+def test_numerical_failure_is_code_4(exit_code, capsys):
+    assert exit_code("numeric") == 4
     assert "numeric: sub-01: no optimum." in capsys.readouterr().err
 
 
 def test_warnings_of_a_refused_unit_are_told_before_the_refusal_and_kept_with_it(
-    stage, empty_study, tmp_path, monkeypatch, capsys
+    exit_code, tmp_path, capsys
 ):
-    monkeypatch.setattr(session, "stages_named", lambda name: (stage("doubtful", "participant"),))
-    out = tmp_path / "out"
-    code = session.run_session("run", empty_study, out, (), None, jobs=1, force=True)
-    assert code == 3
+    assert exit_code("doubtful") == 3
     assert capsys.readouterr().err.splitlines()[:2] == [
         "doubtful: sub-01: the labels look exchanged",
         "doubtful: sub-01: no pose.",
     ]
-    refusal = read_header(out / "sub-01" / "sub-01_refusal-doubtful.parquet", "refusal")
+    path = tmp_path / "out" / "sub-01" / "sub-01_refusal-doubtful.parquet"
+    refusal = read_header(path, "refusal")
     assert refusal["provenance"]["messages"] == ["sub-01: the labels look exchanged"]

@@ -216,32 +216,19 @@ def test_a_recording_beside_the_folders(empty_study):
 
 @pytest.mark.parametrize("error", [OSError(5, "Input/output error"), PermissionError(13, "No")])
 @pytest.mark.parametrize("place", ["study", "sub-01", "ses-1"])
-def test_a_folder_that_cannot_be_listed(empty_study, folder, monkeypatch, error, place):
+def test_a_folder_that_cannot_be_listed(empty_study, folder, failing, error, place):
     make(folder, "ses-1/")
-    listing = Path.iterdir
-
-    def iterdir(path):
-        if path.name == place:
-            raise error
-        return listing(path)
-
-    monkeypatch.setattr(Path, "iterdir", iterdir)
+    failing("iterdir", lambda path: path.name == place, error)
     study, (refusal,) = load(empty_study)
     assert f"{place}: cannot be listed ({error.strerror})" in refusal
     left = ["sub-02"] if place == "sub-01" else ["sub-01", "sub-02"]
     assert [person.id for person in study.participants] == left
 
 
-def test_an_entry_that_cannot_be_looked_at(empty_study, folder, monkeypatch):
+def test_an_entry_that_cannot_be_looked_at(empty_study, folder, failing):
     make(folder, "sub-01_task-walk.c3d")
-    look = Path.stat
-
-    def stat(path, **options):
-        if path.name == "sub-01_task-walk.c3d":
-            raise OSError(5, "Input/output error")
-        return look(path, **options)
-
-    monkeypatch.setattr(Path, "stat", stat)
+    error = OSError(5, "Input/output error")
+    failing("stat", lambda path: path.name == "sub-01_task-walk.c3d", error)
     study, (refusal,) = load(empty_study)
     assert added(study) == {}
     assert "walk.c3d: cannot be looked at (Input/output error)" in refusal

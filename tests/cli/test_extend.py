@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact
-from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.artifacts import write_artifact
 from bsip_cli.commands.show import shown
-from bsip_cli.config import load_config
 from bsip_cli.effects.loads import AddedMass
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.runner import Outcome, perform
-from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.diagnose_trial import cause_record
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.statistics.methods import MEASURED, METHODS
-from bsip_cli.study.study import load_study
-from tests.small_study import small
+from tests.small_study import Run, small
 
 pytestmark = pytest.mark.long
 
@@ -39,34 +33,8 @@ UNITS = 1 + 3 + 1
 EXTEND = [stage.label for stage in STAGES if stage.name == "extend"]
 
 
-@dataclass(frozen=True)
-class Run:
-    study: Path
-    out: Path
-
-    def path(self, kind: str, owner: str = "sub-01") -> Path:
-        return self.out / "sub-01" / f"{owner}_{SCHEMAS[kind].file_name}.parquet"
-
-    def read(self, kind: str, owner: str = "sub-01") -> pd.DataFrame:
-        return read_artifact(self.path(kind, owner), kind)
-
-    def content(self) -> dict[str, bytes]:
-        return {path.name: path.read_bytes() for path in self.out.rglob("*.parquet")}
-
-    def perform(self, label: str, stem: str = "") -> Outcome:
-        return perform(self.unit(label, stem))
-
-    def unit(self, label: str, stem: str = "") -> Unit:
-        config = load_config([self.study / "study.toml"])
-        study, _ = load_study(self.study, config.roles.model_dump())
-        person = study.participants[0]
-        trial = next((trial for trial in person.trials if trial.stem == stem), None)
-        stage = next(each for each in STAGES if each.label == label)
-        return Unit(stage, study, self.out, config, person, trial)
-
-
 def run_of(options: StudyOptions, folder: Path, bsip) -> Run:
-    run = Run(folder / "study", folder / "out")
+    run = Run.within(folder)
     simulate_study(run.study, options)
     answer = bsip("run", run.study, "--out", run.out)
     assert answer.code == 0, answer.err
@@ -85,10 +53,11 @@ def null_run(tmp_path_factory, bsip) -> Run:
 
 @pytest.fixture
 def run(late_run, tmp_path) -> Run:
-    """A copy to change."""
-    shutil.copytree(late_run.study, tmp_path / "study")
-    shutil.copytree(late_run.out, tmp_path / "out")
-    return Run(tmp_path / "study", tmp_path / "out")
+    return late_run.copied_to(tmp_path)
+
+
+def content(run: Run) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in run.out.rglob("*.parquet")}
 
 
 def extended(frame: pd.DataFrame) -> list[str]:
@@ -164,31 +133,31 @@ def test_what_the_delay_had_done_to_the_body(late_run):
 
 
 def test_second_run_does_nothing(run, bsip):
-    content = run.content()
+    before = content(run)
     answer = bsip("run", run.study, "--out", run.out)
     assert " done" not in answer.summary
     answer = bsip("extend", run.study, "--out", run.out)
     assert answer.summary.startswith(f"bsip extend: {UNITS} up to date;")
-    assert run.content() == content
+    assert content(run) == before
 
 
 def test_reconstruct_stays_fresh_and_is_noticed(run, bsip):
-    content = run.content()
+    before = content(run)
     assert run.perform("reconstruct (trial)", SQUAT).state == "fresh"
-    header = read_header(run.path("fit", SQUAT), "fit")["provenance"]
+    header = run.provenance("fit", SQUAT)
     assert (header["made_by"]["stage"], header["amended_by"]["stage"]) == ("reconstruct", "extend")
     assert bsip("reconstruct", run.study, "--out", run.out, "--force").code == 0
     assert extended(run.read("fit", SQUAT)) == []
     answer = bsip("extend", run.study, "--out", run.out)
     assert answer.summary.startswith("bsip extend: 3 done, 2 up to date;")
-    assert run.content() == content
+    assert content(run) == before
 
 
 def test_forced_again_with_the_same_result(run, bsip):
-    content = run.content()
+    before = content(run)
     answer = bsip("extend", run.study, "--out", run.out, "--force")
     assert answer.summary.startswith(f"bsip extend: {UNITS} done;")
-    assert run.content() == content
+    assert content(run) == before
 
 
 def test_without_what_it_amends_it_waits(run):
@@ -203,9 +172,9 @@ def test_without_what_it_amends_it_waits(run):
 
 def diagnose_instead(run: Run, *causes: dict, heavier_by: float = 0.0) -> None:
     """As if the diagnosis had named these, of a body heavier than stated."""
-    path = run.path("overall-diagnosis")
-    notes = read_header(path)["provenance"]
+    notes = run.provenance("overall-diagnosis")
     notes["facts"] |= {"causes": list(causes), "heavier_by": heavier_by}
+    path = run.path("overall-diagnosis")
     write_artifact(path, "overall-diagnosis", run.read("overall-diagnosis"), notes)
     states = [run.perform(EXTEND[0]).state]
     states += [run.perform(EXTEND[1], stem).state for stem in (SEQUENCE, SQUAT, STATIC)]
@@ -214,14 +183,7 @@ def diagnose_instead(run: Run, *causes: dict, heavier_by: float = 0.0) -> None:
 
 
 def cause(effect: str, target: str, values: list[float], *trials: str) -> dict:
-    return {
-        "effect": effect,
-        "target": target,
-        "trials": list(trials),
-        "verdict": "named",
-        "values": values,
-        "folds": [values] * 5,
-    }
+    return cause_record(effect, target, trials, np.array(values))
 
 
 def test_a_cause_of_one_held_out_trial_leaves_the_parameters(run):
@@ -248,9 +210,7 @@ def test_a_mass_sits_where_the_diagnosis_found_it(run):
         table[table["method"] == name].set_index("time_s") for name in ("OM", "OM+added_mass")
     )
     unit = run.unit(EXTEND[1], SQUAT)
-    person = person_from(
-        unit.read("skeleton"), unit.read("marker-positions"), load_skeleton(unit.config.skeleton)
-    )
+    person = person_of(unit)
     methods, phi = parameters_of(unit.read("bsip"), person)
     change = {
         method: AddedMass().change(
@@ -293,9 +253,7 @@ def test_om_is_extended_by_the_estimator_that_made_it(run):
 def test_nothing_of_an_earlier_diagnosis_is_told(run):
     told = "\n".join(shown(run.out, full=True))
     assert "What it does to the forces" in told
-    path = run.path("overall-diagnosis")
-    table, notes = run.read("overall-diagnosis"), read_header(path)["provenance"]
-    write_artifact(path, "overall-diagnosis", table.assign(p_value=2e-4), notes)
+    run.rewrite("overall-diagnosis", run.read("overall-diagnosis").assign(p_value=2e-4))
     told = "\n".join(shown(run.out, full=True))
     assert "What it does to the forces" not in told and "run `bsip extend`" in told
 

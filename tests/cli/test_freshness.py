@@ -22,7 +22,7 @@ from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.unit import imported_by
 from bsip_cli.simulate.study import simulate_study
-from tests.small_study import small
+from tests.small_study import Run, small
 
 ROOT = Path(__file__).parents[2]
 DONE = ("ingest", "scale", "regress")
@@ -47,18 +47,13 @@ print(json.dumps(loaded))
 
 
 @dataclass(frozen=True)
-class Done:
-    """A study and its results, called as a user does."""
+class Done(Run):
+    """Called as a user does."""
 
-    study: Path
-    out: Path
     bsip: Callable
 
     def call(self, stage: str, *options: object):
         return self.bsip(stage, self.study, "--out", self.out, *options)
-
-    def regression(self, who: str = "sub-01") -> Path:
-        return self.out / who / f"{who}_regression.parquet"
 
     def recording(self, who: str) -> Path:
         return self.study / who / f"{who}_task-static.c3d"
@@ -71,19 +66,17 @@ class Done:
 def first(tmp_path_factory, bsip) -> Done:
     """Made once; nobody changes it."""
     folder = tmp_path_factory.mktemp("fresh")
-    simulate_study(folder / "study", OPTIONS)
     done = Done(folder / "study", folder / "out", bsip)
+    simulate_study(done.study, OPTIONS)
     for stage in DONE:
         assert done.call(stage).code == 0
     return done
 
 
 @pytest.fixture
-def done(first, tmp_path, bsip) -> Done:
+def done(first, tmp_path) -> Done:
     """A copy to change."""
-    shutil.copytree(first.study, tmp_path / "study")
-    shutil.copytree(first.out, tmp_path / "out")
-    return Done(tmp_path / "study", tmp_path / "out", bsip)
+    return first.copied_to(tmp_path)
 
 
 # --- code and tables ----------------------------------------------------------------------------
@@ -150,14 +143,14 @@ def test_heavier_thighs_in_a_table_make_other_results(done, copy_of_bsip):
     rows = pd.read_csv(table, comment="#")
     rows.loc[rows["segment"].str.contains("thigh"), "mass_percent"] *= 1.2
     rows.to_csv(table, index=False)
-    before = pd.read_parquet(done.regression())
+    before = pd.read_parquet(done.path("regression"))
     call = ("-m", "bsip_cli", "regress", done.study, "--out", done.out)
     answer = run_python(copy_of_bsip, *call)
     assert answer.returncode == 0, answer.stderr
     assert "bsip regress: 2 done;" in answer.stderr
     because = "is not up to date (the code or a shipped table has changed); `bsip run` brings"
     assert answer.stderr.count(because) == 2  # what regress reads is of the old table, too
-    assert not pd.read_parquet(done.regression()).equals(before)
+    assert not pd.read_parquet(done.path("regression")).equals(before)
     assert "bsip regress: 2 up to date;" in run_python(copy_of_bsip, *call).stderr
 
 
@@ -184,7 +177,7 @@ def rewrite(path: Path) -> None:
     [(flip_a_bit, "has changed since bsip wrote it"), (rewrite, "has no seal of bsip")],
 )
 def test_artifact_changed_by_hand_is_made_again(done, change, found):
-    path = done.regression()
+    path = done.path("regression")
     content, times = path.read_bytes(), path.stat()
     change(path)
     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
@@ -223,7 +216,7 @@ def test_a_stage_alone_says_what_is_stale_before_it(done, tmp_path):
 
 def test_verify_finds_what_a_forged_memory_hides(done):
     """Somebody edits an artifact and writes its new times beside the old hash."""
-    path = done.regression()
+    path = done.path("regression")
     assert done.call("regress").code == 0  # the copy's own inodes are known now
     content = path.read_bytes()
     flip_a_bit(path)
@@ -266,4 +259,4 @@ def test_a_damaged_memory_is_written_anew(done, make):
     make(done.memory())
     answer = done.call("regress")
     assert (answer.code, answer.err.count("\n")) == (0, 1)
-    assert str(done.regression()) in json.loads(done.memory().read_text())["files"]
+    assert str(done.path("regression")) in json.loads(done.memory().read_text())["files"]

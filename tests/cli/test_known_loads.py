@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact
-from bsip_cli.config import Config, Load, load_config
+from bsip_cli.config import Config, Load
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.runner import Outcome, perform
-from bsip_cli.running.unit import Unit
+from bsip_cli.running.runner import perform
 from bsip_cli.schemas import bsip_names
 from bsip_cli.simulate.people import Inertia, combined
 from bsip_cli.simulate.recording import measure_trial, simulate_trial, write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.study.study import load_study
-from tests.small_study import small
+from tests.small_study import Run, small
 
 GOOD = '[[loads]]\nsegment = "shank_r"\nmass_kg = 1.0\nposition_m = [0.0, -0.15, 0.03]\n'
 
@@ -94,36 +90,25 @@ def with_backpack(person):
     return replace(person, inertias={**person.inertias, "thorax": thorax})
 
 
-class Run:
-    """A study of one person and its output; runs units in this process."""
+@dataclass(frozen=True)
+class LoadedRun(Run):
+    """With options as if study.toml had them."""
 
-    def __init__(self, root, loads: tuple[Load, ...] = ()) -> None:
-        self.study, self.out = root / "study", root / "out"
-        self.config = load_config([self.study / "study.toml"])
-        self.declare(*loads)
+    changes: dict = field(default_factory=dict)
+
+    def config(self) -> Config:
+        return super().config().model_copy(update=self.changes)
 
     def declare(self, *loads: Load) -> None:
-        self.config = self.config.model_copy(update={"loads": loads})
+        self.changes["loads"] = loads
 
     def options(self, section: str, **values) -> None:
-        changed = getattr(self.config, section).model_copy(update=values)
-        self.config = self.config.model_copy(update={section: changed})
-
-    def unit(self, stage: str, stem: str = "", config: Config | None = None) -> Unit:
-        config = config or self.config
-        study, refusals = load_study(self.study, config.roles.model_dump())
-        assert not refusals
-        person = study.participants[0]
-        trial = next((trial for trial in person.trials if trial.stem == stem), None)
-        level = "trial" if stem else "participant"
-        first = next(each for each in STAGES if (each.name, each.level) == (stage, level))
-        return Unit(first, study, self.out, config, person, trial)
-
-    def perform(self, stage: str, stem: str = "") -> Outcome:
-        return perform(self.unit(stage, stem))
+        self.changes[section] = getattr(self.config(), section).model_copy(update=values)
 
     def everything(self, until: str) -> dict[str, str]:
         """All stages up to one; the state of each unit."""
+        _, refusals = load_study(self.study, self.config().roles.model_dump())
+        assert not refusals
         states = {}
         for stage in STAGES[: [each.name for each in STAGES].index(until) + 1]:
             stems = (STATIC, PLAIN, LOADED) if stage.level == "trial" else ("",)
@@ -131,12 +116,8 @@ class Run:
                 states[f"{stage.name} {stem}".strip()] = self.perform(stage.name, stem).state
         return states
 
-    def read(self, kind: str, owner: str = "sub-01") -> pd.DataFrame:
-        return read_artifact(self.out / "sub-01" / f"{owner}_{kind}.parquet", kind)
-
-    def facts(self, kind: str, owner: str = "sub-01") -> dict:
-        path = self.out / "sub-01" / f"{owner}_{kind}.parquet"
-        return read_header(path, kind)["provenance"]["facts"]
+    def loads_in(self, kind: str, owner: str = "sub-01") -> list | dict:
+        return self.provenance(kind, owner)["facts"]["loads"]
 
 
 @pytest.fixture(scope="session")
@@ -152,18 +133,15 @@ def carried(tmp_path_factory):
         rates, richness = OPTIONS.rates_of(task), OPTIONS.richness
         measured = measure_trial(moved, person, rates, OPTIONS.laboratory, richness, rng)
         write_trial(path, measured, richness.quantised)
-    run = Run(root)
+    run = LoadedRun.within(root)
     states = run.everything("identify")
     assert set(states.values()) == {"done"}
     return run
 
 
 @pytest.fixture
-def run(carried, tmp_path) -> Run:
-    """A copy to change."""
-    shutil.copytree(carried.study, tmp_path / "study")
-    shutil.copytree(carried.out, tmp_path / "out")
-    return Run(tmp_path)
+def run(carried, tmp_path) -> LoadedRun:
+    return replace(carried.copied_to(tmp_path), changes={})
 
 
 WORN = (
@@ -225,9 +203,9 @@ def test_prediction_and_report_include_the_load(run):
         assert force["OM"] == pytest.approx(force["measured"], abs=5.0)
         assert force["RM"] == pytest.approx(force["measured"], abs=5.0)
     load = {"segment": "upper_torso", "mass_kg": 8.0, "position_m": [-0.2, -0.2, 0.0]}
-    assert run.facts("reconstruction", LOADED)["loads"] == [load]
-    assert run.facts("reconstruction", PLAIN)["loads"] == []
-    assert run.facts("bsip")["loads"] == {PLAIN: [], LOADED: [load]}
+    assert run.loads_in("reconstruction", LOADED) == [load]
+    assert run.loads_in("reconstruction", PLAIN) == []
+    assert run.loads_in("bsip") == {PLAIN: [], LOADED: [load]}
     report = (run.out / "sub-01" / "report.html").read_text(encoding="utf-8")
     plain = report.replace("\N{NO-BREAK SPACE}", " ")
     assert "8 kg on the upper torso in static and sequence (run 2)" in plain
@@ -250,13 +228,6 @@ def test_changed_load_redoes_what_it_touches_and_nothing_else(run):
 # --- several identification trials --------------------------------------------------------------
 
 
-def without_forces(run: Run, stem: str) -> None:
-    """As if a foot had stood beside the plate for the whole trial."""
-    path = run.out / "sub-01" / f"{stem}_wrench.parquet"
-    header = read_header(path, "wrench")["provenance"]
-    write_artifact(path, "wrench", run.read("wrench", stem).assign(valid=False), header)
-
-
 @pytest.mark.long
 def test_two_runs_identify_together(run):
     run.declare(*WORN)
@@ -273,7 +244,8 @@ def test_two_runs_identify_together(run):
 def test_run_with_unusable_forces_does_not_identify(run):
     run.declare(*WORN)
     run.everything("regress")
-    without_forces(run, PLAIN)
+    beside_the_plate = run.read("wrench", PLAIN).assign(valid=False)
+    run.rewrite("wrench", beside_the_plate, PLAIN)
     assert run.perform("identify").state == "done"
     assert set(run.read("used-blocks")["trial"]) == {LOADED}
     assert run.read("identification").iloc[0]["trials"] == LOADED

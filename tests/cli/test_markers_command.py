@@ -33,27 +33,11 @@ def here(tmp_path, monkeypatch):
 
 def recording(folder: Path, labels: Sequence[str], empty: Sequence[str] = ()) -> Path:
     """A TRC file of two frames with markers at different places, on a line as long as a person."""
-    path = folder / "a trial.trc"
-    places_mm = 1e3 * LINE_M / np.sqrt(3) * np.arange(len(labels)) / len(labels)
-    rows = [
-        "\t".join(
-            [str(frame + 1), f"{frame / 100:g}"]
-            + [
-                "\t\t" if label in empty else f"{x:.4f}\t{x + 1:.4f}\t{x + 2:.4f}"
-                for x, label in zip(places_mm, labels, strict=True)
-            ]
-        )
-        for frame in range(2)
-    ]
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
-        f"100\t100\t2\t{len(labels)}\tmm",
-        "Frame#\tTime\t" + "\t\t\t".join(labels) + "\t\t",
-        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(labels) + 1)),
-    ]
-    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
-    return path
+    places_m = LINE_M / np.sqrt(3) * np.arange(len(labels)) / len(labels)
+    frame = places_m[:, None] + [0.0, 0.001, 0.002]
+    frame[np.isin(labels, empty)] = np.nan
+    times = np.array([0.0, 0.01])
+    return write_trc(folder / "a trial.trc", times, np.stack([frame, frame]), labels)
 
 
 def told(path: Path, **options) -> int:
@@ -167,14 +151,20 @@ def test_the_starter_of_a_near_miss_holds_both(here):
 
 def study_of(folder: Path, labels_of_tasks: dict[str, Sequence[str]]) -> Path:
     """One person with a recording per task."""
-    person = folder / "study" / "sub-01"
-    person.mkdir(parents=True)
+    study = study_with(folder, "sub-01\tF\t60\t1.7")
     for task, labels in labels_of_tasks.items():
-        recording(folder, labels).rename(person / f"sub-01_task-{task}.trc")
-    (folder / "study" / "participants.tsv").write_text(
-        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\t1.7\n"
-    )
-    return folder / "study"
+        recording(folder, labels).rename(study / "sub-01" / f"sub-01_task-{task}.trc")
+    return study
+
+
+def study_with(folder: Path, *people: str) -> Path:
+    """Lines of participants.tsv, and a folder for each."""
+    study = folder / "study"
+    for line in people:
+        (study / line.split("\t")[0]).mkdir(parents=True)
+    lines = ["participant_id\tsex\tmass_kg\theight_m", *people]
+    (study / "participants.tsv").write_text("\n".join(lines) + "\n")
+    return study
 
 
 def test_ingest_makes_a_set_of_words_and_hands_it_on(bsip, here):
@@ -216,24 +206,18 @@ def test_exit_codes(bsip, here):
 def test_two_people_of_one_recording_in_a_study(bsip, here):
     both = [f"{name}:{label}" for name in ("Anna", "Ben") for label in HANSEN]
     source = recording(here, both)
+    study = study_with(here, "sub-01\tF\t60\tn/a", "sub-02\tM\t70\tn/a")
     for person in ("sub-01", "sub-02"):
-        folder = here / "study" / person
-        folder.mkdir(parents=True)
-        (folder / f"{person}_task-static.trc").write_bytes(source.read_bytes())
-    (here / "study" / "participants.tsv").write_text(
-        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\tn/a\nsub-02\tM\t70\tn/a\n"
-    )
-    refused = bsip("ingest", here / "study", "--out", here / "out")
+        (study / person / f"{person}_task-static.trc").write_bytes(source.read_bytes())
+    refused = bsip("ingest", study, "--out", here / "out")
     assert refused.code == 3 and "2 people in one file: 'Anna:'" in refused.err
-    options = here / "study" / "study.toml"
+    options = study / "study.toml"
     options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-03 = "Ben:" }\n')
-    unknown = bsip("ingest", here / "study", "--out", here / "out")
-    assert (
-        unknown.code == 2
-        and "ingest.prefixes: there is no sub-03 (did you mean sub-0" in unknown.err
-    )
+    unknown = bsip("ingest", study, "--out", here / "out")
+    assert unknown.code == 2
+    assert "ingest.prefixes: there is no sub-03 (did you mean sub-0" in unknown.err
     options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-02 = "Ben" }\n')
-    assert bsip("ingest", here / "study", "--out", here / "out").code == 0
+    assert bsip("ingest", study, "--out", here / "out").code == 0
     first_y = {}
     for person in ("sub-01", "sub-02"):
         table = pd.read_parquet(here / "out" / person / f"{person}_task-static_markers.parquet")
@@ -246,17 +230,13 @@ def test_two_people_of_one_recording_in_a_study(bsip, here):
 def test_two_people_far_apart_are_no_giant(bsip, tmp_path):
     """The size of each counts, not the way from one's feet to the other's head."""
     markers, labels = standing_markers(80)
-    folder = tmp_path / "study" / "sub-01"
-    folder.mkdir(parents=True)
+    study = study_with(tmp_path, "sub-01\tF\t60\t1.7")
     both = np.concatenate([markers, markers + np.array([4.0, 0.0, 0.0])], axis=1)
     names = [f"{name}:{label}" for name in ("Anna", "Ben") for label in labels]
-    write_trc(folder / "sub-01_task-static.trc", np.arange(80) / 100.0, both, names)
-    (tmp_path / "study" / "participants.tsv").write_text(
-        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\t1.7\n"
-    )
-    refused = bsip("check", tmp_path / "study")
+    write_trc(study / "sub-01" / "sub-01_task-static.trc", np.arange(80) / 100.0, both, names)
+    refused = bsip("check", study)
     assert refused.code == 3 and " tall" not in refused.err
     assert "sub-01_task-static.trc: 2 people in one file: 'Anna:'" in refused.err
-    (tmp_path / "study" / "study.toml").write_text('[ingest]\nprefixes = { sub-01 = "Ben" }\n')
-    chosen = bsip("check", tmp_path / "study")
+    (study / "study.toml").write_text('[ingest]\nprefixes = { sub-01 = "Ben" }\n')
+    chosen = bsip("check", study)
     assert " tall" not in chosen.err and "2 people" not in chosen.err

@@ -111,18 +111,11 @@ def test_other_shapes(tmp_path, reader, text, found):
 
 
 @pytest.mark.parametrize("name", ["a.c3d", "a.trc", "a.toml", "participants.tsv"])
-def test_a_disk_that_fails(tmp_path, monkeypatch, name):
+def test_a_disk_that_fails(tmp_path, failing, name):
     path = tmp_path / name
     path.write_text("a = 1\n")
     read = {".toml": READERS["marker set"], ".tsv": read_people}.get(path.suffix, read_recording)
-    opened = Path.open
-
-    def failing(self, *arguments, **options):
-        if self == path:
-            raise OSError(errno.EIO, "Input/output error")
-        return opened(self, *arguments, **options)
-
-    monkeypatch.setattr(Path, "open", failing)
+    failing("open", lambda opened: opened == path, OSError(errno.EIO, "Input/output error"))
     with pytest.raises((BadDataError, UsageError), match="Input/output error"):
         read(path)
 

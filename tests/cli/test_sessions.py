@@ -7,16 +7,14 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from bsip_cli.artifacts import read_artifact
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.report.words import labelled, task_of, trial_label
-from bsip_cli.running.runner import perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.study.study import Study, Trial, load_study
-from tests.small_study import small
+from bsip_cli.study.study import Trial, load_study
+from tests.small_study import Run, small
 
 ROLES = {"static": ("static",), "sequence": ("sequence",)}
 
@@ -107,41 +105,39 @@ RENAMED = {
 }
 
 
-def performed(root: Path, out: Path) -> Study:
-    """Ingest and scale, in this process."""
-    config = load_config([root / "study.toml"])
-    study, refusals = load_study(root, config.roles.model_dump())
+def performed(run: Run) -> list[Trial]:
+    """Ingest and scale; the trials."""
+    _, refusals = load_study(run.study, run.config().roles.model_dump())
     assert refusals == []
-    (person,) = study.participants
+    trials = run.unit("ingest").study.participants[0].trials
     for stage in STAGES[:3]:
-        for trial in person.trials if stage.level == "trial" else (None,):
-            outcome = perform(Unit(stage, study, out, config, person, trial))
+        for stem in [trial.stem for trial in trials] if stage.level == "trial" else [""]:
+            outcome = run.perform(stage.name, stem)
             assert outcome.state == "done", outcome
-    return study
+    return list(trials)
 
 
 @pytest.mark.long
 def test_sessions_change_no_number(tmp_path):
     """One body and one skeleton, whichever sessions the recordings are of."""
-    root = tmp_path / "study"
+    root, flat = tmp_path / "study", Run(tmp_path / "study", tmp_path / "flat")
     simulate_study(root, small(static=1.0, sequence=4.0))
-    performed(root, tmp_path / "flat")
+    performed(flat)
     for stem, new in RENAMED.items():
         folder = root / "sub-01" / new.split("_")[1]
         folder.mkdir()
         (root / "sub-01" / f"{stem}.c3d").rename(folder / f"{new}.c3d")
-    study = performed(root, tmp_path / "sessions")
-    assert {trial.stem for trial in study.participants[0].trials} == set(RENAMED.values())
-    paths = sorted((tmp_path / "flat" / "sub-01").glob("*.parquet"))
+    sessions = Run(root, tmp_path / "sessions")
+    assert {trial.stem for trial in performed(sessions)} == set(RENAMED.values())
+    paths = sorted((flat.out / "sub-01").glob("*.parquet"))
     assert len(paths) == sum(len(s.writes) * (2 if s.level == "trial" else 1) for s in STAGES[:3])
     kinds = {schema.file_name: kind for kind, schema in SCHEMAS.items()}
     for path in paths:
         kind = kinds[path.stem.rpartition("_")[2]]
-        flat = read_artifact(path, kind).replace(RENAMED)
         stem = path.stem.removesuffix(f"_{SCHEMAS[kind].file_name}")
-        other = path.name.replace(stem, RENAMED.get(stem, stem))
-        other = read_artifact(tmp_path / "sessions" / "sub-01" / other, kind)
+        other = sessions.read(kind, RENAMED.get(stem, stem))
         if kind == "readings":  # a row for each session
             assert set(other["session"]) == {"1", "2"}
             continue
-        pd.testing.assert_frame_equal(flat, other, check_exact=True)
+        expected = flat.read(kind, stem).replace(RENAMED)
+        pd.testing.assert_frame_equal(expected, other, check_exact=True)

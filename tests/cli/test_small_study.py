@@ -12,7 +12,6 @@ import os
 import re
 import shutil
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,21 +21,19 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli import __version__, library
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, load_config
+from bsip_cli.artifacts import read_header, write_artifact
+from bsip_cli.config import load_config
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.running.freshness import why_stale
-from bsip_cli.running.runner import Outcome, held_alone, perform
-from bsip_cli.running.unit import Unit
+from bsip_cli.running.runner import held_alone, perform
 from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnosed_trials import prior_of, weighed
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import load_study
-from tests.small_study import small
+from tests.small_study import Run, small
 
 OPTIONS = small("MF", static=1.0, sequence=10.0, squat=3.0)
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
@@ -45,12 +42,8 @@ FITTED_ONLY = "diagnosis_causes"  # a figure of those people of whom a cause was
 UNITS = 2 * (3 * 6 + 10) + 4  # 6 stages per trial, 10 per participant, 4 of the cohort
 
 
-@dataclass(frozen=True)
-class Run:
-    """A study and what a run made of it."""
-
-    study: Path
-    out: Path
+class WholeRun(Run):
+    """All stages on both participants."""
 
     def files(self) -> dict[str, Path]:
         """Without what is known of their times, which is another in each folder."""
@@ -61,8 +54,7 @@ class Run:
 
     def fitted_causes(self, sub: str) -> int:
         """Of how many candidates a person's diagnosis states a gain."""
-        table = read_artifact(self.out / sub / f"{sub}_diagnosis.parquet", "overall-diagnosis")
-        return int(table["gain_percent"].notna().sum())
+        return int(self.read("overall-diagnosis", sub)["gain_percent"].notna().sum())
 
     def content(self) -> dict[str, bytes]:
         return {name: path.read_bytes() for name, path in self.files().items()}
@@ -76,15 +68,10 @@ class Run:
     def recording(self, stem: str) -> Path:
         return self.study / stem.split("_")[0] / f"{stem}.c3d"
 
-    def path(self, kind: str, owner: str = "sub-01") -> Path:
-        return self.out / owner.split("_")[0] / f"{owner}_{kind}.parquet"
-
-    def perform(self, stage: str, config: Config | None = None) -> Outcome:
-        """A stage on the first participant, in this process."""
-        config = config or load_config([self.study / "study.toml"])
-        study, _ = load_study(self.study, config.roles.model_dump())
-        first = next(each for each in STAGES if each.name == stage)
-        return perform(Unit(first, study, self.out, config, study.participants[0]))
+    def changed(self, before: dict[str, bytes]) -> list[str]:
+        """Files that are no more what they were, gone or new."""
+        now = self.content()
+        return [name for name in {**before, **now} if before.get(name) != now.get(name)]
 
 
 def kind_of(name: str) -> str:
@@ -110,12 +97,17 @@ def owners_of(names: set[str], stage: str) -> set[str]:
     }
 
 
+def options_in(folder: Path, text: str) -> Path:
+    (folder / "own.toml").write_text(text)
+    return folder / "own.toml"
+
+
 @pytest.fixture(scope="session")
 def first_run(tmp_path_factory, bsip):
     """Made once; nobody changes it."""
     folder = tmp_path_factory.mktemp("small")
     simulate_study(folder / "study", OPTIONS)
-    run = Run(folder / "study", folder / "out")
+    run = WholeRun.within(folder)
     answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
     assert answer.code == 0, answer.err
     assert answer.summary == f"bsip run: {UNITS} done; results in {run.out}"
@@ -123,11 +115,9 @@ def first_run(tmp_path_factory, bsip):
 
 
 @pytest.fixture
-def run(first_run, tmp_path) -> Run:
+def run(first_run, tmp_path) -> WholeRun:
     """A copy to change."""
-    shutil.copytree(first_run.study, tmp_path / "study")
-    shutil.copytree(first_run.out, tmp_path / "out")
-    return Run(tmp_path / "study", tmp_path / "out")
+    return first_run.copied_to(tmp_path)
 
 
 # --- what a run leaves --------------------------------------------------------------------------
@@ -135,10 +125,10 @@ def run(first_run, tmp_path) -> Run:
 
 def test_rm_mass_stands_beside_rm_and_om(first_run):
     """In held-out trials too; one number changes no centre of pressure."""
-    masses = read_artifact(first_run.path("bsip"), "bsip").groupby("method")["mass_kg"].sum()
-    row = read_artifact(first_run.path("identification"), "identification").set_index("method")
+    masses = first_run.read("bsip").groupby("method")["mass_kg"].sum()
+    row = first_run.read("identification").set_index("method")
     assert masses["RM+mass"] == pytest.approx(row.loc["RM+mass", "mass_factor"] * masses["RM"])
-    fit = read_artifact(first_run.path("fit", "sub-01_task-squat_run-1"), "fit")
+    fit = first_run.read("fit", "sub-01_task-squat_run-1")
     assert set(fit["data"]) == {"held_out"}
     rmse = fit.pivot(index="component", columns="method", values="rmse")
     assert rmse.loc["cop_ap", "RM+mass"] == pytest.approx(rmse.loc["cop_ap", "RM"])
@@ -160,11 +150,9 @@ def test_files_of_a_run(first_run):
 @pytest.mark.long
 def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):
     """Another folder, one process instead of two."""
-    again = Run(first_run.study, tmp_path / "elsewhere")
+    again = WholeRun(first_run.study, tmp_path / "elsewhere")
     assert bsip("run", again.study, "--out", again.out, "--jobs", 1).code == 0
-    first, second = first_run.content(), again.content()
-    assert set(first) == set(second)
-    assert [name for name in first if first[name] != second[name]] == []
+    assert again.changed(first_run.content()) == []
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.label)
@@ -224,7 +212,7 @@ def sha256(path: Path) -> str:
 
 def test_listed_files_are_there_with_their_hash(first_run):
     for kind, owner in (("report-files", "sub-01"), ("tables-files", "group")):
-        listed = read_artifact(first_run.path(kind, owner), kind)
+        listed = first_run.read(kind, owner)
         assert len(listed) > 5
         for row in listed.itertuples():
             assert sha256(first_run.out / row.file) == row.sha256
@@ -258,14 +246,9 @@ def test_methods_say_what_was_done(first_run, bsip, tmp_path):
 
 
 def test_methods_name_options_that_differ(run, bsip, tmp_path):
-    other = tmp_path / "other.toml"
-    other.write_text("[reconstruct]\ncutoff_hz = 7.0\n")
-    assert (
-        bsip(
-            "reconstruct", run.study, "--out", run.out, "--participant", "sub-01", "--config", other
-        ).code
-        == 0
-    )
+    other = options_in(tmp_path, "[reconstruct]\ncutoff_hz = 7.0\n")
+    asked = ("--participant", "sub-01", "--config", other)
+    assert bsip("reconstruct", run.study, "--out", run.out, *asked).code == 0
     text = " ".join(bsip("methods", run.out).out.split())
     assert "Options that differ among the results (the text gives the first): reconstruct." in text
     assert "below 7.0 Hz" in text
@@ -294,17 +277,14 @@ def test_the_library_gives_the_same_tables(first_run):
                 if kind in ("reconstruction", "fit"):
                     continue  # `extend` adds what the diagnosis named
                 owner = f"sub-01_task-{name}" if name else "sub-01"
-                expected = read_artifact(first_run.path(SCHEMAS[kind].file_name, owner), kind)
+                expected = first_run.read(kind, owner)
                 pd.testing.assert_frame_equal(person.table(kind, name), expected)
                 compared += 1
     assert compared > 30
-    path = first_run.path("diagnosis")
-    assert set(diagnosis["effect"]) >= set(named_in(read_artifact(path, "overall-diagnosis")))
+    in_run = first_run.read("overall-diagnosis")
+    named = set(in_run.loc[in_run["verdict"] == "named", "effect"])
+    assert set(diagnosis["effect"]) >= named
     assert set(gains) == set(moments) == set(trials)
-
-
-def named_in(diagnosis: pd.DataFrame) -> list[str]:
-    return list(diagnosis.loc[diagnosis["verdict"] == "named", "effect"])
 
 
 @pytest.mark.parametrize("what", ["joints", "opensim", "bids"])
@@ -327,14 +307,14 @@ def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
         return
     assert names == {f"{stem}_joint-moments.csv" for stem in stems}
     for stem in stems:
-        table = read_artifact(first_run.path("joint-moments", stem.split("/")[1]), "joint-moments")
+        table = first_run.read("joint-moments", stem.split("/")[1])
         found = pd.read_csv(to / f"{stem}_joint-moments.csv")
         assert list(found) == list(table)
         assert found["moment_Nm"].to_numpy() == pytest.approx(table["moment_Nm"], nan_ok=True)
 
 
 def _models(run: Run) -> list[str]:
-    uses = (read_artifact(run.path("choice", f"sub-0{k}"), "choice").iloc[0]["use"] for k in (1, 2))
+    uses = (run.read("choice", f"sub-0{k}").iloc[0]["use"] for k in (1, 2))
     return [f"sub-0{k}/sub-0{k}_{use}.osim" for k, use in enumerate(uses, start=1)]
 
 
@@ -400,8 +380,7 @@ def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
 
 
 def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
@@ -420,13 +399,12 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
         "report (participant)",
     }
     assert all("sub-01" in name for name in rewritten)
-    made_by = read_header(run.path("fit", f"sub-01_{TRIALS[0]}"))["provenance"]["made_by"]
+    made_by = run.provenance("fit", f"sub-01_{TRIALS[0]}")["made_by"]
     assert made_by["options"]["reconstruct"]["cop_min_force_percent_bw"] == 31.0
 
 
 def test_changed_option_of_the_cohort(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[stats]\nalpha = 0.04\n")
+    own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
     times = run.times()
     answer = bsip("run", run.study, "--out", run.out, "--config", own)
     assert answer.summary.startswith(f"bsip run: 3 done, {UNITS - 3} up to date;")
@@ -436,11 +414,12 @@ def test_changed_option_of_the_cohort(run, bsip, tmp_path):
 
 def test_changed_role_rebuilds_the_skeleton(run):
     """The calibrating trial is a matter of roles, not of scale's own options."""
-    config = load_config([run.study / "study.toml"])
-    assert run.perform("scale", config).state == "fresh"
+    config = run.config()
+    assert run.perform("scale", config=config).state == "fresh"
     roles = config.roles.model_copy(update={"static": ("squat",)})
-    assert run.perform("scale", config.model_copy(update={"roles": roles})).state == "done"
-    trial = read_artifact(run.path("person"), "person")["calibration_trial"][0]
+    changed = config.model_copy(update={"roles": roles})
+    assert run.perform("scale", config=changed).state == "done"
+    trial = run.read("person")["calibration_trial"][0]
     assert trial == "sub-01_task-squat_run-1"
 
 
@@ -549,8 +528,7 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
         f"{first}: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not "
         "up to date (other options (participant)); run `bsip run` first"
     )
-    values = read_artifact(run.path("values", "group"), "values")
-    assert set(values["participant"]) == {"sub-01"}
+    assert set(run.read("values", "group")["participant"]) == {"sub-01"}
     assert all(name.startswith("group/") for name in run.rewritten(times))
     before.to_csv(table, sep="\t", index=False, na_rep="n/a")
     assert bsip("run", run.study, "--out", run.out, "--group").code == 0
@@ -558,8 +536,7 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
 
 
 def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
     answer = bsip("run", run.study, "--out", run.out, "--config", own, "--group")
     assert answer.code == 3
@@ -575,8 +552,7 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
 
 
 def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_path):
-    own = tmp_path / "own.toml"
-    own.write_text("[stats]\nalpha = 0.04\n")
+    own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
     answer = bsip("tables", run.study, "--out", run.out, "--config", own)
     assert answer.code == 0
     assert answer.err.splitlines()[0] == (
@@ -610,15 +586,11 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
         written = (name for name in rewritten if "refusal" not in name)
         assert not any("sub-02" in owner or "squat" in owner for owner in owners_of(written, stage))
     assert owners_of(rewritten, "identify") == {"sub-01"}
-    assert "sub-01_task-squat_run-1" not in set(
-        read_artifact(run.path("values", "group"), "values")["trial"]
-    )
+    assert "sub-01_task-squat_run-1" not in set(run.read("values", "group")["trial"])
 
     recording.write_bytes(whole)
     assert bsip("run", run.study, "--out", run.out, "--jobs", 2).code == 0
-    now, before = run.content(), first_run.content()
-    assert [name for name in before if now.get(name) != before[name]] == []
-    assert set(now) == set(before)
+    assert run.changed(first_run.content()) == []
 
 
 def test_refused_recording_that_is_taken_out(run, bsip):
@@ -634,10 +606,9 @@ def test_refused_recording_that_is_taken_out(run, bsip):
 def test_stale_artifact_of_a_refused_unit_is_not_read(run):
     """The kinematics of an earlier run do not stand for what the last run refused."""
     stem = f"sub-01_{TRIALS[1]}"
-    unit = unit_of(run, "reconstruct", stem)
-    assert perform(unit).state == "fresh"
+    assert run.perform("reconstruct", stem).state == "fresh"
     shutil.copy(run.path("kinematics", stem), run.path("refusal-ik", stem))
-    assert perform(unit).state == "waiting"
+    assert run.perform("reconstruct", stem).state == "waiting"
 
 
 def test_refusal_of_a_later_stage_does_not_take_a_trial_away(run):
@@ -649,24 +620,17 @@ def test_refusal_of_a_later_stage_does_not_take_a_trial_away(run):
 
 def test_refusal_makes_the_cohort_look_again(run):
     """What a participant had before the refusal is no result any more."""
-    study, _ = load_study(run.study, load_config([]).roles.model_dump())
-    config = load_config([run.study / "study.toml"])
-    stats = next(stage for stage in STAGES if stage.name == "stats")
-    assert not why_stale(Unit(stats, study, run.out, config))
+    assert not why_stale(run.unit_of_group("stats"))
     shutil.copy(run.path("person"), run.path("refusal-scale", "sub-02"))
-    assert why_stale(Unit(stats, study, run.out, config))
+    assert why_stale(run.unit_of_group("stats"))
 
 
 @pytest.mark.parametrize(("stage", "counts"), [("scale", False), ("extend", True)])
 def test_who_counts_in_the_tables_after_a_refusal(run, stage, counts):
     """What comes after the numbers that are compared takes nobody away."""
-    study, _ = load_study(run.study, load_config([]).roles.model_dump())
-    config = load_config([run.study / "study.toml"])
     shutil.copy(run.path("person"), run.path(f"refusal-{stage}", "sub-02"))
-    stats = next(each for each in STAGES if each.name == "stats")
-    assert perform(Unit(stats, study, run.out, config)).state == "done"
-    people = set(read_artifact(run.path("values", "group"), "values")["participant"])
-    assert ("sub-02" in people) == counts
+    assert perform(run.unit_of_group("stats")).state == "done"
+    assert ("sub-02" in set(run.read("values", "group")["participant"])) == counts
 
 
 def test_report_follows_what_was_refused(run):
@@ -678,14 +642,6 @@ def test_report_follows_what_was_refused(run):
         assert run.perform("report").state == "done"
         assert sentence in (run.out / "sub-01" / "report.html").read_text(encoding="utf-8")
         assert run.perform("report").state == "fresh"
-
-
-def unit_of(run: Run, stage: str, stem: str) -> Unit:
-    config = load_config([run.study / "study.toml"])
-    study, _ = load_study(run.study, config.roles.model_dump())
-    trial = next(trial for trial in study.participants[0].trials if trial.stem == stem)
-    first = next(each for each in STAGES if each.name == stage)
-    return Unit(first, study, run.out, config, study.participants[0], trial)
 
 
 def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
@@ -730,8 +686,7 @@ def test_warnings_are_told_and_kept(run, bsip):
     assert answer.code == 0
     (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
     assert "the plates measure" in told
-    kept = read_header(run.path("person"))["provenance"]["messages"]
-    assert told.removeprefix("scale: ") in kept
+    assert told.removeprefix("scale: ") in run.provenance("person")["messages"]
 
 
 def test_where_no_trial_is_on_the_plates_nobody_says_that_nothing_is_wrong(run, monkeypatch):
@@ -742,20 +697,16 @@ def test_where_no_trial_is_on_the_plates_nobody_says_that_nothing_is_wrong(run, 
     told = " ".join(outcome.sentences)
     assert "no movement can be diagnosed" in told and "Inconclusive" in told
     assert "Nothing is wrong" not in told
-    assert read_artifact(run.path("diagnosis"), "overall-diagnosis").empty
+    assert run.read("overall-diagnosis").empty
 
 
 def test_a_static_trial_off_the_plates_weighs_nobody(run):
     stem = f"sub-01_{TRIALS[2]}"
-    unit = unit_of(run, "diagnose", stem)
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    assert stem in {trial.stem for trial, _ in weighed(unit, person).scenes}
-    path = run.path("wrench", stem)
-    wrench, notes = read_artifact(path, "wrench"), read_header(path)["provenance"]
-    write_artifact(path, "wrench", wrench.assign(valid=False), notes)
-    unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
-    assert stem not in {trial.stem for trial, _ in weighed(unit, person).scenes}
+    unit = run.unit("diagnose")
+    assert stem in {trial.stem for trial, _ in weighed(unit, person_of(unit)).scenes}
+    run.rewrite("wrench", run.read("wrench", stem).assign(valid=False), stem)
+    unit = run.unit("diagnose")
+    assert stem not in {trial.stem for trial, _ in weighed(unit, person_of(unit)).scenes}
 
 
 @pytest.fixture
@@ -774,14 +725,13 @@ def judged_by(monkeypatch) -> list[float | None]:
 
 def test_a_mass_that_all_trials_contradict_makes_none_of_them_odd(run, judged_by):
     """The table's body is 5 % heavier than the person on the plates."""
-    path = run.path("regression")
-    table, notes = read_artifact(path, "regression"), read_header(path)["provenance"]
+    table = run.read("regression")
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1.05
-    write_artifact(path, "regression", table, notes)
+    run.rewrite("regression", table)
     run.path("diagnosis").unlink()
     assert run.perform("diagnose").state == "done"
     assert judged_by == [None, pytest.approx(1 / 1.05 - 1, abs=0.004)]
-    told = read_artifact(run.path("diagnosis"), "overall-diagnosis")
+    told = run.read("overall-diagnosis")
     assert set(told[told["verdict"] != "rejected"]["class_id"]) == {"W"}
 
 
@@ -795,31 +745,27 @@ def test_exchanged_labels_are_put_right_before_the_poses(run):
     """The knee's markers bear each other's labels for a second: as if nothing had been."""
     before = residuals_seen(run)
     stem = f"sub-01_{TRIALS[1]}"
-    clean = read_artifact(run.path("kinematics", stem), "kinematics")
-    path = run.path("markers", stem)
-    markers, notes = read_artifact(path, "markers"), read_header(path)["provenance"]
+    clean, markers = run.read("kinematics", stem), run.read("markers", stem)
     swap = {"RKNEL": "RKNEM", "RKNEM": "RKNEL"}
     wrong = markers["time_s"].between(1.0, 2.0)
     markers.loc[wrong, "marker"] = markers.loc[wrong, "marker"].replace(swap)
     markers = markers.sort_values(["time_s", "marker"], kind="stable", ignore_index=True)
-    write_artifact(path, "markers", markers, notes)
-    outcome = perform(unit_of(run, "ik", stem))
+    run.rewrite("markers", markers, stem)
+    outcome = run.perform("ik", stem)
     assert any("; corrected" in sentence for sentence in outcome.sentences)
-    events = read_artifact(run.path("marker-events", stem), "marker-events")
+    events = run.read("marker-events", stem)
     (event,) = events[events["kind"] == "swap"].itertuples()
     assert {event.marker, event.partner} == set(swap)
     assert (event.start_s, event.end_s) == pytest.approx((1.0, 2.0), abs=0.021)
     assert event.put_right
-    kinematics = read_artifact(run.path("kinematics", stem), "kinematics")
-    pd.testing.assert_frame_equal(kinematics, clean, atol=1e-6)
+    pd.testing.assert_frame_equal(run.read("kinematics", stem), clean, atol=1e-6)
     np.testing.assert_allclose(residuals_seen(run), before, atol=1e-6)
 
 
 def residuals_seen(run: Run) -> np.ndarray:
     """(N, m, 3) of the markers in the squat, as the diagnosis sees them."""
-    unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    unit = run.unit("diagnose")
+    person = person_of(unit)
     (squat,) = (t for t in unit.trials("kinematics") if t.stem == f"sub-01_{TRIALS[1]}")
     scene = scene_of(unit, person, prior_of(unit, person).phi, squat)
     assert scene.residual_m is not None
@@ -863,14 +809,12 @@ def holder():
 
 def test_a_second_run_on_the_same_folder_is_refused(run, bsip, holder):
     """It says who is busy, changes nothing there, and does everybody else."""
-    before = {name: path.read_bytes() for name, path in run.files().items()}
+    before = run.content()
     process = holder(run.out / "sub-01")
     answer = bsip("run", run.study, "--out", run.out, "--force")
     assert answer.code == 2
     assert "sub-01: another bsip is writing there. To correct it: wait until" in answer.err
-    assert {n: run.files()[n].read_bytes() for n in before if "sub-01" in n} == {
-        n: content for n, content in before.items() if "sub-01" in n
-    }
+    assert not [name for name in run.changed(before) if "sub-01" in name]
     process.kill()
     process.join()
     assert bsip("run", run.study, "--out", run.out).code == 0  # a dead process holds nothing

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from tests.small_study import small
 
 ROOT = Path(__file__).parents[2]
 INSTALLED = ROOT / ".venv-cluster" / "bin" / "snakemake"
@@ -224,15 +224,7 @@ def test_make_cluster_fails_with_one_after_the_tables_of_the_others(place):
 
 
 def test_the_same_artifacts_as_make(tmp_path):
-    options = StudyOptions(
-        participants=2,
-        seed=3,
-        sexes="M",
-        tasks=("static", "sequence"),
-        durations_s={"static": 1.0, "sequence": 10.0},
-        rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    )
-    simulate_study(tmp_path / "study", options)
+    simulate_study(tmp_path / "study", small("MM", static=1.0, sequence=10.0))
     place = Place(tmp_path)
     place.install(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
     given = ("COHORT=study", "OUT=out")

@@ -8,14 +8,14 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.errors import BadDataError
-from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from tests.small_study import small
 
 GONE_S = 5.0  # within which all processes are gone after a signal, or after their parent
 POLL_S = 0.005
@@ -24,15 +24,7 @@ _UNFINISHED = ".*.bsip-part"
 
 
 def make_study(folder: Path, participants: int) -> Path:
-    options = StudyOptions(
-        participants=participants,
-        seed=3,
-        sexes="MF",
-        tasks=("static",),
-        durations_s={"static": 1.0},
-        rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    )
-    simulate_study(folder, options)
+    simulate_study(folder, small(("MF" * participants)[:participants], static=1.0))
     return folder
 
 
@@ -111,6 +103,21 @@ class Bench:
         found = files_of(out)
         names = sorted(found.keys() | self.whole.keys())
         return [name for name in names if found.get(name) != self.whole.get(name)]
+
+
+UPSTREAM = {"ingest": (), "regress": ("ingest", "scale")}
+"""Cheap stages whose calls fail, and what is upstream of them."""
+
+
+def benches(run: Run, folder: Path, names: Sequence[str]) -> Iterator[Bench]:
+    """Each stage where its results are not there yet, and where they are and are made again."""
+    study = make_study(folder / "study", participants=1)
+    for name in names:
+        before = folder / f"before_{name}"
+        for stage in UPSTREAM[name]:
+            run(study, before, (stage,), {})
+        yield Bench.of(run, study, before, name)
+        yield Bench.of(run, study, before.with_name(f"{before.name}_whole_{name}"), name, "--force")
 
 
 def by_processes(

@@ -25,8 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.crash import faults, signals
-from tests.crash.bench import Bench, by_processes, make_study
-from tests.crash.benches import UPSTREAM, benches
+from tests.crash.bench import UPSTREAM, Bench, benches, by_processes, make_study
 from tests.crash.every_call import every_call
 
 SIGNALLED = ("ingest", "--jobs", "2")

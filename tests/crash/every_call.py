@@ -29,8 +29,7 @@ from bsip_cli.errors import BadDataError, NotWritableError
 from bsip_cli.files.fingerprints import forget_all
 from bsip_cli.running import runner
 from tests.crash import faults
-from tests.crash.bench import Ended
-from tests.crash.benches import benches
+from tests.crash.bench import Ended, benches
 
 _NOTES = {"made_by": {"stage": "ingest"}, "messages": [], "facts": {}}
 _FAILURES = ((errno.EIO, False), (errno.EMFILE, False), (errno.ENOSPC, True), (errno.EROFS, True))

@@ -9,12 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from bsip_cli.diagnosis.fault_model import corrected, fitted
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
-from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
+from bsip_cli.effects.nameless import NAMELESS
 from bsip_cli.effects.scene import Scene
 from tests.diagnosis.noisy_trial import (
     late,
@@ -27,7 +29,7 @@ from tests.diagnosis.noisy_trial import (
 
 NAMED_FROM, ODDS = 0.95, 0.1
 OF_THE_LAB = ("sync_offset", "plate_gain", "plate_zero", "gravity_tilt")
-ASKED = (*(EFFECTS[name] for name in OF_THE_LAB), *PATTERNS)
+ASKED = (*(EFFECTS[name] for name in OF_THE_LAB), *NAMELESS)
 SEEDS = (1, 2, 3)
 
 
@@ -139,6 +141,26 @@ def unevenness_of_a_delay(*scenes: Scene) -> float:
 def test_a_delay_of_the_second_half_is_uneven_and_one_throughout_is_not():
     assert unevenness_of_a_delay(late(movement(2), 0.015)) < 0
     assert unevenness_of_a_delay(half_late(2)) > 10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_plates_that_are_moved_in_the_middle_of_two_trials_are_uneven(seed):
+    shift = EFFECTS["plate_translation"]
+    trials = (movement(seed), movement(seed + 10, 8.0))
+
+    def moved_from(moment_s: float) -> float:
+        scenes = [
+            shown(
+                x,
+                shift.change(x, "all", np.array([0.016, 0, 0])) * (x.times_s >= moment_s)[:, None],
+            )
+            for x in trials
+        ]
+        one = Hypothesis(shift, "all", (0, 1), np.array([0.008, 0, 0]))
+        return unevenness(corrected(fitted(session(*scenes), [one])), 0, np.ones(2))
+
+    assert moved_from(-1.0) < 0
+    assert moved_from(4.9) > 5
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -6,6 +6,7 @@ import pytest
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.inertia import from_phi
 from bsip_cli.dynamics.ground_wrench import (
     move_moments,
     pinocchio_model,
@@ -15,7 +16,7 @@ from bsip_cli.dynamics.ground_wrench import (
     skew,
     wrench_regressor,
 )
-from tests.body.standing_person import Swing, standing, tilted_person
+from tests.body.standing_person import Swing, parameters_of, standing, tilted_person
 
 
 def random_inertias(count, seed):
@@ -78,13 +79,8 @@ def test_the_wrench_is_weight_plus_the_rate_of_momentum():
     """
     person = standing().person
     model = pinocchio_model(person)
-    bodies = [
-        body.moved(-origin)
-        for body, origin in zip(
-            regress(person, "M", 73.0).inertias, person.origin_in_joint_m, strict=True
-        )
-    ]
-    phi = np.concatenate([body.phi() for body in bodies])
+    phi = parameters_of(person, regress(person, "M", 73.0).inertias)
+    bodies = [from_phi(part) for part in phi.reshape(-1, 10)]
     swing = Swing(model, standing().q, seed=3, amplitude=0.5)
     data = model.createData()
     h = 1e-3
@@ -136,11 +132,7 @@ def test_the_wrench_is_weight_plus_the_rate_of_momentum():
 def test_a_person_at_rest_presses_down_below_the_centre_of_mass():
     person = standing().person
     model = pinocchio_model(person)
-    bodies = [
-        b.moved(-o)
-        for b, o in zip(regress(person, "F", 60.0).inertias, person.origin_in_joint_m, strict=True)
-    ]
-    phi = np.concatenate([body.phi() for body in bodies])
+    phi = parameters_of(person, regress(person, "F", 60.0).inertias)
     zero = np.zeros((1, model.nv))
     wrench = predicted_wrench(model, standing().q[None], zero, zero, phi[:, None], np.zeros(3))
     full = with_inertias(model, phi)

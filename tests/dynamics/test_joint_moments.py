@@ -15,7 +15,8 @@ import pytest
 
 from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.dynamics.joint_moments import Ground, Spread, axes_of, joint_loads, of_accelerations
-from tests.body.standing_person import Swing, joint_frames, standing, with_girdle
+from tests.body.standing_person import Swing, joint_frames, parameters_of, standing, with_girdle
+from tests.dynamics.newton_euler import driving_wrench, joint_axes
 from tests.exports.exported_person import identified_person
 
 STEP_S = 1e-3
@@ -33,13 +34,6 @@ def motion(girdle: bool = False, seed: int = 3):
     return body, *swing.sampled(1.0, 1 / STEP_S)[1:]
 
 
-def rate(x: np.ndarray) -> np.ndarray:
-    """Fourth-order central differences; the two samples at either end are wrong."""
-    d = np.gradient(x, STEP_S, axis=0)
-    d[2:-2] = (8 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / (12 * STEP_S)
-    return d
-
-
 def newton_euler(body, q):
     """By segment: (N, 6) force and moment about the world's origin that drive its body."""
     person = body.person
@@ -47,14 +41,9 @@ def newton_euler(body, q):
     wrenches = {}
     for i, inertia in zip(person.skeleton.bodies, body.inertias, strict=True):
         com = p[:, i] + R[:, i] @ (inertia.com_m + person.origin_in_joint_m[i])
-        spin = rate(R[:, i]) @ R[:, i].swapaxes(1, 2)
-        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-        turned = R[:, i] @ inertia.tensor_kgm2 @ R[:, i].swapaxes(1, 2)
-        linear = inertia.mass_kg * rate(com)
-        angular = np.cross(com, linear) + (turned @ w[..., None])[..., 0]
-        force = rate(linear) - inertia.mass_kg * G
-        moment = rate(angular) - np.cross(com, inertia.mass_kg * G)
-        wrenches[person.skeleton.segments[i]] = np.hstack([force, moment])
+        wrenches[person.skeleton.segments[i]] = driving_wrench(
+            R[:, i], com, inertia.mass_kg, inertia.tensor_kgm2, G, STEP_S
+        )
     return R, p, wrenches
 
 
@@ -80,9 +69,21 @@ def feet(count: int) -> dict[str, Ground]:
 
 
 def phi_of(body) -> np.ndarray:
-    origins = body.person.origin_in_joint_m[list(body.person.skeleton.bodies)]
-    moved = zip(body.inertias, origins, strict=True)
-    return np.concatenate([inertia.moved(-origin).phi() for inertia, origin in moved])[:, None]
+    return parameters_of(body.person, body.inertias)[:, None]
+
+
+def at_rest(person, q, phi, ground, spread=KNOWN):
+    """Joint loads of one still pose (nq,)."""
+    still = np.zeros((1, len(person.skeleton.v_names)))
+    return joint_loads(person, q[None], still, still, phi, ground, spread)
+
+
+def pushed(wrench: np.ndarray) -> dict[str, Ground]:
+    """By a known wrench (6,) under the right foot."""
+    return {"foot_r": Ground(wrench[None], np.zeros((1, 6)), np.zeros(3))}
+
+
+NO_MASS = np.zeros((150, 1))
 
 
 @pytest.mark.parametrize("girdle", [False, True])
@@ -98,11 +99,8 @@ def test_net_moments_are_those_of_newton_and_euler(girdle):
         total = sum(wrenches[s] for s in segments if s in wrenches)
         total = total - sum(ground[s].wrench for s in segments if s in ground)
         force, moment = total[:, :3], total[:, 3:] - np.cross(p[:, i], total[:, :3])
-        side = -1.0 if joint.endswith("_l") else 1.0
-        first, third = R[:, parent] @ [0, 0, 1], side * (R[:, i] @ [0, 1, 0])
-        second = np.cross(third, first)
-        second /= np.linalg.norm(second, axis=1, keepdims=True)
-        for axis, e in enumerate((first, second, third)):
+        axes = joint_axes(R[:, parent], R[:, i], -1.0 if joint.endswith("_l") else 1.0)
+        for axis, e in enumerate(axes.swapaxes(0, 1)):
             expected_moment = (moment * e).sum(axis=1)[inner]
             expected_force = (force * e).sum(axis=1)[inner]
             limit = max(0.01 * np.abs(moment[inner]).max(), 0.1)
@@ -140,14 +138,8 @@ def test_the_pelvis_lacks_the_residual_of_the_whole_body():
     missing = -wrenches["lower_torso"]
     for joint in ("hip_l", "hip_r", "waist"):
         j = found.joints.index(joint)
-        side = -1.0 if joint.endswith("_l") else 1.0
         i = j + 1
-        axes = np.stack(
-            [R[:, 0] @ [0, 0, 1], np.full((len(q), 3), np.nan), side * (R[:, i] @ [0, 1, 0])],
-            axis=1,
-        )
-        second = np.cross(axes[:, 2], axes[:, 0])
-        axes[:, 1] = second / np.linalg.norm(second, axis=1, keepdims=True)
+        axes = joint_axes(R[:, 0], R[:, i], -1.0 if joint.endswith("_l") else 1.0)
         force = np.linalg.solve(axes, found.force_N[:, j])[..., 0]
         moment = np.linalg.solve(axes, found.moment_Nm[:, j])[..., 0]
         missing = missing - np.hstack([force, moment + np.cross(p[:, i], force)])
@@ -163,8 +155,6 @@ def test_both_sides_mean_the_same():
     joints[i] = place * [1, 1, -1]
     zero = np.zeros_like(person.parent_tilt_rad)
     same = replace(person, joint_in_parent_m=joints, parent_tilt_rad=zero, child_tilt_rad=zero)
-    q = pin.neutral(pinocchio_model(same))[None]
-    still = np.zeros((1, len(same.skeleton.v_names)))
     push, none = np.array([30.0, 70.0, 20.0]), np.zeros((1, 6))
     at = same.joint_positions_m()[j] + [0.05, -0.8, 0.03]
     ground = {}
@@ -172,7 +162,7 @@ def test_both_sides_mean_the_same():
         force = push * [1, 1, sign]
         wrench = np.hstack([force, np.cross(at * [1, 1, sign], force)])[None]
         ground[f"foot_{side}"] = Ground(wrench, none, np.zeros(3))
-    found = joint_loads(same, q, still, still, np.zeros((150, 1)), ground, KNOWN)
+    found = at_rest(same, pin.neutral(pinocchio_model(same)), NO_MASS, ground)
     left, right = (found.moment_Nm[0, found.joints.index(f"hip_{s}"), :, 0] for s in "lr")
     np.testing.assert_allclose(left, right, atol=1e-9)
     assert np.abs(right).min() > 0.05
@@ -180,18 +170,12 @@ def test_both_sides_mean_the_same():
 
 def test_a_force_ahead_of_the_ankle_asks_for_plantarflexion():
     """Standing on the toes of the right foot: plantarflexion, knee and hip as textbooks have it."""
-    person = standing().person
-    still = np.zeros((1, len(person.skeleton.v_names)))
-    q = standing().q[None]
-    _, p = joint_frames(person, q)
-    ankle = p[0, person.skeleton.index("foot_r")]
+    person, q = standing().person, standing().q
+    (R,), (p,) = joint_frames(person, q[None])
     force = np.array([0.0, 0.0, 700.0])
-    anterior = joint_frames(person, q)[0][0, 0] @ [1.0, 0, 0]
-    place = ankle + 0.12 * anterior
-    ground = {
-        "foot_r": Ground(np.hstack([force, np.cross(place, force)])[None], still[:, :6], p[0, 0])
-    }
-    found = joint_loads(person, q, still, still, np.zeros((150, 1)), ground, KNOWN)
+    place = p[person.skeleton.index("foot_r")] + 0.12 * R[0] @ [1.0, 0, 0]
+    ground = pushed(np.hstack([force, np.cross(place, force)]))
+    found = at_rest(person, q, NO_MASS, ground)
     j = found.joints.index("ankle_r")
     assert axes_of("ankle_r")[0] == "dorsiflexion"
     assert found.moment_Nm[0, j, 0, 0] == pytest.approx(-0.12 * 700, rel=0.05)
@@ -203,8 +187,7 @@ def test_an_axis_without_direction_is_no_number():
     q = pin.neutral(pinocchio_model(person))
     at = person.skeleton.q_starts[person.skeleton.index("upper_arm_r")]
     q[at : at + 4] = pin.Quaternion(pin.exp3(np.array([-np.pi / 2, 0.0, 0.0]))).coeffs()
-    still = np.zeros((1, len(person.skeleton.v_names)))
-    found = joint_loads(person, q[None], still, still, np.ones((150, 1)), {}, KNOWN)
+    found = at_rest(person, q, np.ones((150, 1)), {})
     j = found.joints.index("shoulder_r")
     np.testing.assert_array_equal(np.isfinite(found.moment_Nm[0, j, :, 0]), [True, False, True])
     assert not np.isfinite(found.power_W[0, j]).any()
@@ -258,33 +241,24 @@ def test_plates_and_centres_spread_as_drawn_ones_do():
 
 def test_a_centre_that_is_off_is_a_lever_of_the_joints_force():
     """A foot without mass under which something pushes: the moment errs by force times way."""
-    person = standing().person
-    still = np.zeros((1, len(person.skeleton.v_names)))
-    wrench = np.array([[30.0, 40.0, 700.0, 5.0, 6.0, 7.0]])
-    ground = {"foot_r": Ground(wrench, np.zeros((1, 6)), np.zeros(3))}
-    of_centres = Spread((None,), 0.01)
-    found = joint_loads(
-        person, standing().q[None], still, still, np.zeros((150, 1)), ground, of_centres
-    )
+    person, q = standing().person, standing().q
+    wrench = np.array([30.0, 40.0, 700.0, 5.0, 6.0, 7.0])
+    found = at_rest(person, q, NO_MASS, pushed(wrench), Spread((None,), 0.01))
     j = found.joints.index("hip_r")
-    first = joint_frames(person, standing().q[None])[0][0, 0] @ [0, 0, 1]
-    expected = 0.01 * np.linalg.norm(np.cross(wrench[0, :3], first))
+    first = joint_frames(person, q[None])[0][0, 0] @ [0, 0, 1]
+    expected = 0.01 * np.linalg.norm(np.cross(wrench[:3], first))
     assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(expected)
 
 
 def test_axes_that_are_turned_show_what_lies_across():
     """Drawn turns of all axes together, of a moment known in the world."""
-    person = standing().person
-    still = np.zeros((1, len(person.skeleton.v_names)))
-    wrench = np.array([[30.0, 40.0, 700.0, 50.0, 60.0, 70.0]])
-    ground = {"foot_r": Ground(wrench, np.zeros((1, 6)), np.zeros(3))}
-    turned = Spread((None,), 0.0, 0.02)
-    q = standing().q[None]
-    found = joint_loads(person, q, still, still, np.zeros((150, 1)), ground, turned)
+    person, q = standing().person, standing().q
+    wrench = np.array([30.0, 40.0, 700.0, 50.0, 60.0, 70.0])
+    found = at_rest(person, q, NO_MASS, pushed(wrench), Spread((None,), 0.0, 0.02))
     j = found.joints.index("hip_r")
-    R, p = joint_frames(person, q)
-    moment = -(wrench[0, 3:] - np.cross(p[0, j + 1], wrench[0, :3]))
-    first = R[0, 0] @ [0, 0, 1]
+    (R,), (p,) = joint_frames(person, q[None])
+    moment = -(wrench[3:] - np.cross(p[j + 1], wrench[:3]))
+    first = R[0] @ [0, 0, 1]
     rng = np.random.default_rng(1)
     shown = [moment @ (first + np.cross(rng.normal(0, 0.02, 3), first)) for _ in range(4000)]
     assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(np.std(shown), rel=0.05)

@@ -15,8 +15,7 @@ from bsip_cli.dynamics.ground_wrench import (
     wrench_response,
 )
 from bsip_cli.dynamics.segment_motion import segment_motion
-from tests.body.standing_person import Swing, standing, with_girdle
-from tests.effects.moving_scene import phi_of
+from tests.body.standing_person import Swing, parameters_of, standing, with_girdle
 
 GIRDLE = with_girdle().person
 RODS = [i for i, name in enumerate(GIRDLE.skeleton.segments) if name.startswith("clavicle")]
@@ -27,9 +26,7 @@ def moving(person, q, seed=3):
 
 
 def table_phi(person):
-    inertias = regress(person, "M", 72.0).inertias
-    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
-    return np.concatenate([i.moved(-o).phi() for i, o in zip(inertias, origins, strict=True)])
+    return parameters_of(person, regress(person, "M", 72.0).inertias)
 
 
 def test_parameters_are_those_of_the_fifteen():
@@ -66,7 +63,7 @@ def test_still_clavicles_are_none():
         q17[:, skeleton.q_starts[i] + 3] = 1.0
     own = [skeleton.v_names.index(name) for name in plain.person.skeleton.v_names]
     v17[:, own], a17[:, own] = v, a
-    phi = phi_of(plain.person, regress(plain.person, "M", 72.0).inertias)[:, None]
+    phi = table_phi(plain.person)[:, None]
     expected = predicted_wrench(pinocchio_model(plain.person), q, v, a, phi, np.zeros(3))
     found = predicted_wrench(pinocchio_model(GIRDLE), q17, v17, a17, phi, np.zeros(3))
     np.testing.assert_allclose(found, expected, atol=1e-8)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.body.exports.osim import COORDINATES
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.joint_moments import JointLoads
+from tests.dynamics.newton_euler import driving_wrench, joint_axes
 
 
 def read_mot(file: Path) -> dict[str, np.ndarray]:
@@ -81,16 +82,7 @@ class Model:
         """(N, 6) force and moment about the origin that move a body."""
         (R, p), ((mass,), centre, (xx, yy, zz, xy, xz, yz)) = placed, self.bodies[name]
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        com = p + R @ centre
-        spin = _rate(R, step) @ R.swapaxes(1, 2)
-        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-        turned = R @ inertia @ R.swapaxes(1, 2)
-        linear = mass * _rate(com, step)
-        angular = np.cross(com, linear) + np.einsum("nij,nj->ni", turned, w)
-        weight = mass * self.gravity
-        return np.hstack(
-            [_rate(linear, step) - weight, _rate(angular, step) - np.cross(com, weight)]
-        )
+        return driving_wrench(R, p + R @ centre, mass, inertia, self.gravity, step)
 
 
 class _Joint:
@@ -142,12 +134,6 @@ def _on(R, p, offset, place):
     return R @ offset, p + R @ place
 
 
-def _rate(x: np.ndarray, step: float) -> np.ndarray:
-    d = np.gradient(x, step, axis=0)
-    d[2:-2] = (8 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / (12 * step)
-    return d
-
-
 def by_coordinate(person: Person, R: np.ndarray, found: JointLoads) -> dict[str, np.ndarray]:
     """bsip's moments (N,) of the first body as OpenSim has them: about the axis of each turn.
 
@@ -160,10 +146,8 @@ def by_coordinate(person: Person, R: np.ndarray, found: JointLoads) -> dict[str,
         side = np.array([1.0, -1.0, -1.0] if joint.endswith("_l") else [1.0, 1.0, 1.0])
         about = found.moment_Nm[:, j, :, 0] * side
         if kind == "revolute":
-            first, third = R[:, skeleton.parents[i]] @ [0, 0, 1], R[:, i] @ [0, 1, 0]
-            second = np.cross(third, first)
-            second /= np.linalg.norm(second, axis=1, keepdims=True)
-            moment = np.linalg.solve(np.stack([first, second, third], axis=1), about[..., None])
+            axes = joint_axes(R[:, skeleton.parents[i]], R[:, i])
+            moment = np.linalg.solve(axes, about[..., None])
             hinge = R[:, i] @ person.hinge_axes()[i]
             about = np.einsum("nc,nc->n", moment[..., 0], hinge)[:, None]
         moments |= {f"{joint}_{p}": a for p, a in zip(COORDINATES[kind], about.T, strict=True)}

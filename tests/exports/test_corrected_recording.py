@@ -28,21 +28,14 @@ from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session
 from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.command import inject_study
-from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
+from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnose_trial import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
+from tests.small_study import small
 
 STEM, STATIC = "sub-01_task-squat_run-1", "sub-01_task-static"
-OPTIONS = StudyOptions(
-    participants=1,
-    seed=8,
-    sexes="M",
-    tasks=("static", "squat"),
-    durations_s={"static": 1.0, "squat": 3.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-    laboratory=Laboratory(plate_per_foot=True),
-)
+OPTIONS = replace(small("M", 8, static=1.0, squat=3.0), laboratory=Laboratory(plate_per_foot=True))
 PAIR, SWAPS = ("RKNEL", "RKNEM"), ((0.5, 0.9), (1.0, 2.0))
 
 # What is hidden, and the same as a diagnosis says it: the file's y and z are the plate's reversed.
@@ -65,6 +58,14 @@ TURNED_CAMERAS = fault("camera_frame", 0.02, "x", "", 0.02, 0.0)
 LEVER_NM = 1.2  # 4 % of what is on plate 2, at the depth of its sensor under its surface
 
 
+def _cause(
+    effect: str, target: str, values: list[float], trials: Sequence[str], verdict: str = "named"
+) -> dict:
+    """As in the facts of a diagnosis."""
+    known = {"effect": effect, "target": target, "trials": [*trials], "verdict": verdict}
+    return known | {"values": values, "folds": [values] * 5}
+
+
 @dataclass(frozen=True)
 class Study:
     """As it was, with something hidden in it, and what is known of the latter."""
@@ -83,33 +84,16 @@ class Study:
     ) -> None:
         """``alike``: effect and target of what cannot be told from the causes. ``numbers`` and
         ``rejected``: sizes of them that are named and rejected, one of each."""
-        verdict = "ambiguous" if alike else "named"
-        group = [*((effect, target) for effect, target, _ in causes), *alike]
-        none = nothing(0.01, (STEM,))
-        findings = (
-            replace(none, effect=effect, target=target, class_id="A" if alike else "")
-            for effect, target in (group if alike else ())
-        )
-        sized = (
-            replace(none, effect=effect, target=target, numbers=(one,))
-            for (effect, target, _), one in zip(causes, numbers, strict=False)
-        )
-        hardly = (
-            replace(none, effect=effect, target=target, numbers=(one,), verdict="rejected")
-            for (effect, target, _), one in zip(causes, rejected, strict=False)
-        )
-        table = rows_of((*findings, *sized, *hardly), ())
-        facts = [
-            {
-                "effect": effect,
-                "target": target,
-                "trials": [*concerned],
-                "verdict": verdict,
-                "values": values,
-                "folds": [values] * 5,
-            }
-            for effect, target, values in causes
-        ]
+        verdict, none = "ambiguous" if alike else "named", nothing(0.01, (STEM,))
+        of_causes = [replace(none, effect=effect, target=target) for effect, target, _ in causes]
+        others = [replace(none, effect=effect, target=target) for effect, target in alike]
+        group = [replace(one, class_id="A") for one in (*of_causes, *others)] if alike else []
+        sizes = [(one, (x,)) for one, x in zip(of_causes, numbers, strict=False)]
+        sized = [replace(one, numbers=x) for one, x in sizes]
+        less = [(one, (x,)) for one, x in zip(of_causes, rejected, strict=False)]
+        hardly = [replace(one, numbers=x, verdict="rejected") for one, x in less]
+        table = rows_of((*group, *sized, *hardly), ())
+        facts = [_cause(*one, concerned, verdict) for one in causes]
         wrenches = (self.made.out / "sub-01").glob("*_wrench.parquet")
         made_by = {"inputs": {path.name: file_hash(path) for path in wrenches}}
         notes = NOTES | {"made_by": made_by, "facts": {"causes": facts, "trials": [*looked_at]}}
@@ -143,26 +127,52 @@ def hide(tmp_path, plain):
             change(path)
         assert run_session("ingest", made.study, made.out, (), None, jobs=1, force=False) == 0
         write_person(made, "sub-01")
+        nothing = empty_table("marker-events")
         swaps = [
-            dict.fromkeys(empty_table("marker-events").columns, 0.0)
+            dict.fromkeys(nothing.columns, 0.0)
             | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
             | {"start_s": start, "end_s": end - 0.01, "put_right": True}
             for start, end in SWAPS
             if any(one.name == "marker_swap" for one in asked)
         ]
-        for task in ("squat_run-1", "static"):
-            path = made.out / "sub-01" / f"sub-01_task-{task}_marker-events.parquet"
-            table = pd.DataFrame(swaps) if swaps and task != "static" else None
-            events = empty_table("marker-events") if table is None else table
+        for stem, events in ((STEM, pd.DataFrame(swaps) if swaps else nothing), (STATIC, nothing)):
+            path = made.out / "sub-01" / f"{stem}_marker-events.parquet"
             write_artifact(path, "marker-events", events, NOTES)
         return Study(plain, made)
 
     return hidden
 
 
-def both(study: Study, path: Path) -> tuple[Recording, Recording]:
-    """The recording as it was before anything was hidden, and as it is exported."""
-    return read_recording(study.plain / "sub-01" / path.name), read_recording(path)
+@dataclass(frozen=True)
+class Corrected:
+    """A recording as it was before anything was hidden, with it, and as it is exported; and what
+    was said."""
+
+    plain: Path
+    spoilt: Path
+    path: Path
+    said: str
+
+    def both(self) -> tuple[Recording, Recording]:
+        """Before anything was hidden, and as exported."""
+        return read_recording(self.plain), read_recording(self.path)
+
+    def is_as_it_was(self) -> bool:
+        return self.path.read_bytes() == self.spoilt.read_bytes()
+
+
+@pytest.fixture
+def corrected(hide, capsys):
+    """Hides faults and corrects what a diagnosis names, ``known`` as of `Study.diagnosed_as`."""
+
+    def of(*asked: Asked, causes: Sequence = (), change=None, **known) -> Corrected:
+        study = hide(*asked, change=change)
+        study.diagnosed_as(*causes, **known)
+        path = study.exported()
+        places = (root / "sub-01" / path.name for root in (study.plain, study.made.study))
+        return Corrected(*places, path, capsys.readouterr().err)
+
+    return of
 
 
 def wrenches(recording: Recording) -> np.ndarray:
@@ -171,28 +181,24 @@ def wrenches(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.parametrize("faults", [(GAIN, ZERO), (TURNED, ASIDE), (LEAK,)])
-def test_plates_read_what_they_would_have_read(hide, faults, capsys):
-    study = hide(*(asked for asked, _ in faults))
-    study.diagnosed_as(*(cause for _, cause in faults))
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+def test_plates_read_what_they_would_have_read(corrected, faults):
+    asked, causes = zip(*faults, strict=True)
+    one = corrected(*asked, causes=causes)
+    before, after = one.both()
     apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
     assert (apart[:3] < 0.05).all() and (apart[3:] < (LEVER_NM if LEAK in faults else 0.02)).all()
     assert np.array_equal(before.markers_m, after.markers_m, equal_nan=True)
     for _, (effect, target, _) in faults:
-        assert f"{STEM}: corrected: {effect} {target}: " in said
+        assert f"{STEM}: corrected: {effect} {target}: " in one.said
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("faults", [(GAIN, LATE), (ASIDE, SLOW), (LATE, SLOW)])
-def test_forces_are_back_at_their_time(hide, faults, capsys):
+def test_forces_are_back_at_their_time(corrected, faults):
     """Noise between samples is interpolated twice, so tenths of a second are compared."""
-    study = hide(*(asked for asked, _ in faults))
-    study.diagnosed_as(*(cause for _, cause in faults))
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+    asked, causes = zip(*faults, strict=True)
+    one = corrected(*asked, causes=causes)
+    before, after = one.both()
     first = round((after.time0_s - before.time0_s) * before.marker_rate_hz)
     assert 0 < before.n_frames - first - after.n_frames <= 4
     shown = before.markers_m[first : first + after.n_frames]
@@ -200,19 +206,17 @@ def test_forces_are_back_at_their_time(hide, faults, capsys):
     now, then = wrenches(after), wrenches(before)[:, 5 * first :][:, : 5 * after.n_frames]
     apart = uniform_filter1d(now - then, 25, axis=1)[:, 25:-25]
     assert np.abs(apart[..., :3]).max() < 0.5 and np.abs(apart[..., 3:]).max() < 0.3
-    spoilt = wrenches(read_recording(study.made.study / "sub-01" / path.name))
+    spoilt = wrenches(read_recording(one.spoilt))
     spoilt = spoilt[:, : now.shape[1]] - wrenches(before)[:, 5 * first :][:, : now.shape[1]]
     assert np.abs(uniform_filter1d(spoilt, 25, axis=1)[:, 25:-25]).max() > 3.0
-    assert "frames left out at the end, whose forces were not recorded: " in said
+    assert "frames left out at the end, whose forces were not recorded: " in one.said
 
 
 @pytest.mark.parametrize("turned", [TILTED, TURNED_CAMERAS])
-def test_markers_and_forces_are_turned_into_true_axes(hide, turned):
-    study = hide(turned[0])
-    study.diagnosed_as(turned[1])
-    path = study.exported()
-    before, after = both(study, path)
-    spoilt = read_recording(study.made.study / "sub-01" / path.name)
+def test_markers_and_forces_are_turned_into_true_axes(corrected, turned):
+    one = corrected(turned[0], causes=[turned[1]])
+    before, after = one.both()
+    spoilt = read_recording(one.spoilt)
     assert np.nanmax(np.abs(spoilt.markers_m - before.markers_m)) > 0.01
     shift = np.nanmedian(after.markers_m - before.markers_m, axis=(0, 1))  # the file's pivot is not
     if turned is TURNED_CAMERAS:  # that of who hid it
@@ -236,21 +240,26 @@ def test_markers_and_forces_are_turned_into_true_axes(hide, turned):
 def test_a_recording_that_nobody_looked_at_has_what_its_session_shares(
     concerned, looked_at, session, found
 ):
-    trials = [SimpleNamespace(stem=stem, session=session if stem == "C" else "") for stem in "ABC"]
-    cause = {"effect": "plate_gain", "target": "1 fz", "trials": [*concerned], "verdict": "named"}
-    facts = {"causes": [cause | {"values": [0.06], "folds": [[0.06]]}], "trials": [*looked_at]}
-    unit = SimpleNamespace(
-        name="C",
-        own_trial=trials[2],
-        person=SimpleNamespace(id="sub-01", trials=trials),
-        facts=lambda kind: facts,
-        has=lambda kind: False,
-    )
+    unit = unit_of_c(_cause("plate_gain", "1 fz", [0.06], concerned), looked_at, session)
     assert len(causes_here(unit, ["1"])) == found
     assert not causes_here(unit, ["2"])
 
 
-def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(hide, capsys):
+def unit_of_c(cause: dict, looked_at: str, session: str = "") -> SimpleNamespace:
+    """The recording C beside A and B, and a diagnosis that looked at some of them."""
+    trials = [SimpleNamespace(stem=stem, session=session if stem == "C" else "") for stem in "ABC"]
+    return SimpleNamespace(
+        name="C",
+        own_trial=trials[2],
+        person=SimpleNamespace(id="sub-01", trials=trials),
+        facts=lambda kind: {"causes": [cause], "trials": [*looked_at]},
+        has=lambda kind: False,
+    )
+
+
+def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(
+    hide, plain, capsys
+):
     study = hide(GAIN[0])
     study.diagnosed_as(looked_at=(STATIC,))
     named = {"effect": "plate_gain", "target": "1 fz", "parameter": "gain", "estimate": 0.06}
@@ -277,7 +286,7 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     facts = {"persons": {"1": {"sub-01": "sub-01", "sub-02": "sub-02"}}, "answer": {}}
     write_artifact(path, "laboratory", rows, NOTES | {"facts": facts})
     exported = study.exported()
-    before, after = both(study, exported)
+    before, after = (read_recording(x) for x in (plain / "sub-01" / exported.name, exported))
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
     said = capsys.readouterr().err
     assert f"{STEM}: corrected: plate_gain 1 fz: gain 6 % taken off" in said
@@ -292,14 +301,12 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     assert f"export: {STEM}: nothing to correct" in capsys.readouterr().err
 
 
-def test_plates_that_tell_points_read_what_they_would_have_read(hide, capsys):
+def test_plates_that_tell_points_read_what_they_would_have_read(corrected):
     """Force and centre of pressure as channels (TYPE 1)."""
-    study = hide(ZERO[0], TURNED[0], change=into_points)
-    study.diagnosed_as(ZERO[1], TURNED[1])
-    path = study.exported()
-    assert "corrected: plate_zero" in capsys.readouterr().err
-    before, after = both(study, path)
-    assert ezc3d.c3d(str(path))["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"][0] == 1
+    one = corrected(ZERO[0], TURNED[0], causes=[ZERO[1], TURNED[1]], change=into_points)
+    assert "corrected: plate_zero" in one.said
+    before, after = one.both()
+    assert ezc3d.c3d(str(one.path))["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"][0] == 1
     apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
     assert (apart[:3] < 0.05).all() and (apart[3:] < 0.1).all()
 
@@ -328,25 +335,22 @@ def into_points(path: Path) -> None:
     c3d.write(str(path))
 
 
-def test_labels_are_exchanged_back_and_the_file_says_so(hide, capsys):
-    study = hide(
+def test_labels_are_exchanged_back_and_the_file_says_so(corrected):
+    one = corrected(
         *(
             Asked("marker_swap", end - start, f"{'+'.join(PAIR)},start_s={start}")
             for start, end in SWAPS
         )
     )
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
-    before, after = both(study, path)
+    before, after = one.both()
     assert np.allclose(before.markers_m, after.markers_m, atol=1e-7, equal_nan=True)
     assert np.array_equal(wrenches(before), wrenches(after))
     words = f"labels {' and '.join(PAIR)} exchanged from 1.000 to 1.990 s"
-    assert words in said
-    old, new = (ezc3d.c3d(str(one)) for one in (study.made.study / "sub-01" / path.name, path))
+    assert words in one.said
+    old, new = (ezc3d.c3d(str(path)) for path in (one.spoilt, one.path))
     entry = " ".join(new["parameters"]["BSIP"]["CORRECTED"]["value"])
     assert words in entry and f"bsip {__version__}: corrected by" in entry
-    assert file_hash(study.made.study / "sub-01" / path.name) in entry.replace(" ", "")
+    assert file_hash(one.spoilt) in entry.replace(" ", "")
     assert all_else_is_equal(old, new)
 
 
@@ -368,7 +372,7 @@ def all_else_is_equal(old, new) -> bool:
     return True
 
 
-def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path, capsys):
+def test_channels_that_ingest_corrects_are_corrected_in_the_file(corrected):
     """Moments in N mm that are said to be N m, in all trials."""
 
     def misread(path: Path) -> None:
@@ -378,15 +382,12 @@ def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path,
         c3d["parameters"]["ANALOG"]["UNITS"]["value"] = ["Nm" if u == "Nmm" else u for u in units]
         c3d.write(str(path))
 
-    study = hide(change=misread)
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
+    one = corrected(change=misread)
     for plate in "12":
-        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in said
-    before, after = both(study, path)
+        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in one.said
+    before, after = one.both()
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.01
-    units = ezc3d.c3d(str(path))["parameters"]["ANALOG"]["UNITS"]["value"]
+    units = ezc3d.c3d(str(one.path))["parameters"]["ANALOG"]["UNITS"]["value"]
     assert "Nm" in units and "Nmm" not in units
 
 
@@ -401,15 +402,11 @@ def lifted(path: Path) -> None:
         c3d.write(str(path))
 
 
-def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
-    study = hide(change=lifted)
-    study.diagnosed_as()
-    path = study.exported()
-    said = capsys.readouterr().err
-    assert f"{STEM}: corrected: plate 2: its reading without load, (" in said
-    assert said.count("its reading without load") == 1
-    before = wrenches(read_recording(study.made.study / "sub-01" / path.name))
-    after = wrenches(read_recording(path))
+def test_what_a_plate_reads_without_load_is_taken_off_once(corrected):
+    one = corrected(change=lifted)
+    assert f"{STEM}: corrected: plate 2: its reading without load, (" in one.said
+    assert one.said.count("its reading without load") == 1
+    before, after = (wrenches(read_recording(path)) for path in (one.spoilt, one.path))
     taken = before - after
     assert np.allclose(taken[0], 0.0, atol=1e-4)
     assert np.allclose(np.abs(taken[1, :, 2]), 12.0, atol=0.1)
@@ -417,114 +414,76 @@ def test_what_a_plate_reads_without_load_is_taken_off_once(hide, capsys):
 
 
 def test_a_zero_is_not_taken_off_for_what_the_others_of_the_session_have():
-    trials = [SimpleNamespace(stem=stem, session="") for stem in "ABC"]
-    cause = {"effect": "plate_zero", "target": "1 fz", "trials": ["A", "B"], "verdict": "named"}
-    facts = {"causes": [cause | {"values": [9.0], "folds": [[9.0]]}], "trials": ["A", "B"]}
-    unit = SimpleNamespace(
-        name="C",
-        own_trial=trials[2],
-        person=SimpleNamespace(id="sub-01", trials=trials),
-        facts=lambda kind: facts,
-        has=lambda kind: False,
-    )
+    unit = unit_of_c(_cause("plate_zero", "1 fz", [9.0], "AB"), "AB")
     assert len(causes_here(unit, ["1", "2"], zeroed=["2"])) == 1
     assert not causes_here(unit, ["1", "2"], zeroed=["1"])
 
 
-def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0]))
-    path = study.exported()
-    said = capsys.readouterr().err
-    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
+def test_what_is_no_fault_of_the_recording_stays_and_is_said(corrected):
+    one = corrected(GAIN[0], causes=[("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0])])
+    assert one.is_as_it_was()
     why = "added_mass hand_r: no fault of the plates, the clocks, the axes or the labels"
-    assert f"{STEM}: not corrected: {why}" in said
-    assert "sub-01_task-static: nothing to correct" in said
-    assert (path.parents[1] / "participants.tsv").exists()
+    assert f"{STEM}: not corrected: {why}" in one.said
+    assert "sub-01_task-static: nothing to correct" in one.said
+    assert (one.path.parents[1] / "participants.tsv").exists()
 
 
-def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(GAIN[1], alike=[("added_mass", "hand_r")])
-    path = study.exported()
-    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
-    said = capsys.readouterr().err
-    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
+def test_what_cannot_be_told_from_another_cause_stays(corrected):
+    one = corrected(GAIN[0], causes=[GAIN[1]], alike=[("added_mass", "hand_r")])
+    assert one.is_as_it_was()
+    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in one.said
 
 
-def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("plate_gain", "all fz")])
-    study.exported()
-    assert "not corrected: plate_gain all fz: one of several causes" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("effect", "target", "said"),
+    [
+        ("plate_gain", "all fz", "not corrected: plate_gain all fz: one of several causes"),
+        ("unexplained", "", ": its signal is not known exactly"),
+        ("marker_shift", "T10", "marker_shift T10: one of several causes"),
+    ],
+)
+def test_what_the_diagnosis_did_not_size_is_said(corrected, effect, target, said):
+    assert said in corrected(GAIN[0], alike=[(effect, target)]).said
 
 
-def test_what_has_no_name_is_said(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("unexplained", "")])
-    study.exported()
-    assert ": its signal is not known exactly" in capsys.readouterr().err
+def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size():
+    assert why_left("marker_shift", "unknown").startswith("no fault of the plates")
+    assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
-def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
-    study = hide(ZERO[0])
-    study.diagnosed_as(ZERO[1], alike=[("plate_zero", "1 fz")])
-    before, after = both(study, study.exported())
+def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(corrected):
+    one = corrected(ZERO[0], causes=[ZERO[1]], alike=[("plate_zero", "1 fz")])
+    before, after = one.both()
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
-    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in (
-        capsys.readouterr().err
-    )
+    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in one.said
 
 
-def test_the_size_is_said_with_its_interval(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(GAIN[1], numbers=(Number("gain", "1", 0.06, 0.0552, 0.0657),))
-    path = study.exported()
+@pytest.mark.parametrize("rejected", [(), (Number("gain", "1", 0.01, 0.0, 0.1),)])
+def test_the_size_is_said_with_its_interval(corrected, rejected):
+    """Not a rejected one: what the laboratory has is looked for in each person once more."""
+    found = (Number("gain", "1", 0.06, 0.0552, 0.0657),)
+    one = corrected(GAIN[0], causes=[GAIN[1]], numbers=found, rejected=rejected)
     said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
-    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
-    entry = ezc3d.c3d(str(path))["parameters"]["BSIP"]["CORRECTED"]["value"]
+    assert f"{STEM}: corrected: {said}" in one.said
+    entry = ezc3d.c3d(str(one.path))["parameters"]["BSIP"]["CORRECTED"]["value"]
     assert said in entry
 
 
-def test_the_size_that_is_said_is_not_a_rejected_one(hide, capsys):
-    """What the laboratory has is looked for in each person once more, and not found."""
-    study = hide(GAIN[0])
-    found, other = Number("gain", "1", 0.06, 0.0552, 0.0657), Number("gain", "1", 0.01, 0.0, 0.1)
-    study.diagnosed_as(GAIN[1], numbers=(found,), rejected=[other])
-    study.exported()
-    said = "plate_gain 1 fz: gain 6.0 % (95 % interval 5.5 to 6.6) taken off"
-    assert f"{STEM}: corrected: {said}" in capsys.readouterr().err
-
-
-def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(hide, capsys):
+def test_what_a_person_has_beside_the_laboratory_is_taken_off_too(corrected):
     """The same fault twice, in the same trials, with two sizes."""
-    study = hide(GAIN[0])
     larger, smaller = (*GAIN[1][:2], [0.04]), (*GAIN[1][:2], [0.02])
     both_sizes = Number("gain", "1", 0.04, 0.03, 0.05), Number("gain", "1", 0.02, 0.01, 0.03)
-    study.diagnosed_as(larger, smaller, numbers=both_sizes)
-    study.exported()
-    said = capsys.readouterr().err
+    said = corrected(GAIN[0], causes=[larger, smaller], numbers=both_sizes).said
     for size in ("4.0 % (95 % interval 3.0 to 5.0)", "2.0 % (95 % interval 1.0 to 3.0)"):
         assert f"{STEM}: corrected: plate_gain 1 fz: gain {size} taken off" in said
 
 
-def test_the_size_that_is_told_is_taken_off(hide):
+def test_the_size_that_is_told_is_taken_off(corrected):
     """``extend`` leaves a person's own recordings out of what the laboratory tells; the sentence
     does not."""
-    study = hide(GAIN[0])
-    own = (*GAIN[1][:2], [0.07])
-    study.diagnosed_as(own, numbers=(Number("gain", "1", 0.06, 0.05, 0.07),))
-    before, after = both(study, study.exported())
+    own, told = (*GAIN[1][:2], [0.07]), Number("gain", "1", 0.06, 0.05, 0.07)
+    before, after = corrected(GAIN[0], causes=[own], numbers=(told,)).both()
     assert np.abs(wrenches(after) - wrenches(before))[..., :3].max() < 0.05
-
-
-def test_a_fault_of_no_instrument_is_not_said_to_be_of_unknown_size(hide, capsys):
-    study = hide(GAIN[0])
-    study.diagnosed_as(alike=[("marker_shift", "T10")])
-    study.exported()
-    assert "marker_shift T10: one of several causes" in capsys.readouterr().err
-    assert why_left("marker_shift", "unknown").startswith("no fault of the plates")
-    assert why_left("marker_swap", "unknown") == why_left("plate_gain", "unknown") == "unknown"
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

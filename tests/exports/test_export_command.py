@@ -7,6 +7,7 @@ import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.running.unit import file_hash
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table
+from bsip_cli.stages.scale import _marker_table, _skeleton_table
 from tests.exports.exported_person import identified_person
 from tests.exports.test_osim_given import draw, inertias_in
 
@@ -95,34 +97,13 @@ def results(tmp_path) -> Results:
 
 
 def write_person(made: Results, participant: str) -> None:
+    """As `scale` would, of a person whose refinement changed nothing."""
     person = identified_person().person
-    skeleton, zeros = person.skeleton, np.zeros(15)
-    parents = ["", *(skeleton.segments[k] for k in skeleton.parents[1:])]
-    table = {
-        "segment": skeleton.segments,
-        "parent": parents,
-        "joint": skeleton.joints,
-        "joint_type": skeleton.joint_types,
-        "parent_tilt_rad": person.parent_tilt_rad,
-        "child_tilt_rad": person.child_tilt_rad,
-        "length_m": person.lengths_m,
-        **dict.fromkeys(("first_guess_m", "length_sd_m", "joint_shift_m"), zeros),
-        "held": person.held,
-    }
-    for k, axis in enumerate("xyz"):
-        table[f"joint_{axis}_m"] = person.joint_in_parent_m[:, k]
-        table[f"origin_{axis}_m"] = person.origin_in_joint_m[:, k]
-    path = made.artifact("skeleton", participant)
-    write_artifact(path, "skeleton", pd.DataFrame(table), NOTES)
-    markers = {
-        "marker": person.markers,
-        "segment": [skeleton.segments[k] for k in person.marker_segments],
-        **{f"{axis}_m": person.marker_positions_m[:, k] for k, axis in enumerate("xyz")},
-        "weight": person.marker_weights,
-        **dict.fromkeys(("shift_m", "residual_m"), np.zeros(len(person.markers))),
-    }
-    path = made.artifact("marker-positions", participant)
-    write_artifact(path, "marker-positions", pd.DataFrame(markers), NOTES)
+    poses = SimpleNamespace(residual_m=np.zeros((1, len(person.markers))))
+    same = SimpleNamespace(person=person, length_sd_m=np.zeros(15), poses=poses)
+    for kind, table_of in (("skeleton", _skeleton_table), ("marker-positions", _marker_table)):
+        table = table_of(person.skeleton, same, same)
+        write_artifact(made.artifact(kind, participant), kind, table, NOTES)
 
 
 # --- files --------------------------------------------------------------------------------------

@@ -113,3 +113,36 @@ def problem_of(
     noise = even_noise(np.broadcast_to(noise_rms, 6).astype(float), count)
     equations = equations_of(rows, measured)
     return Problem(equations, noise, world().prior, world().basis, trust_ratio)
+
+
+def noisy_problem(
+    rows: np.ndarray,
+    noise: np.ndarray | float,
+    seed: int,
+    phi: np.ndarray | None = None,
+    trust_ratio: float = 1.0,
+) -> Problem:
+    """The wrench of the true parameters, or of ``phi``, with white noise of a known size."""
+    clean = rows @ (world().phi_true if phi is None else phi)
+    measured = clean + np.random.default_rng(seed).normal(0, noise, clean.shape)
+    return problem_of(rows, measured, noise, trust_ratio)
+
+
+def standing_still(samples: int) -> np.ndarray:
+    """(n, 6, 150) rows of a person who does not move for a while."""
+    q, v, a = motion(30.0)
+    model = world().model
+    still = wrench_regressor(model, model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3))
+    return np.repeat(still, samples, axis=0)
+
+
+def without_segment(segment: str) -> np.ndarray:
+    """(n, 6, 150) rows of a motion in which a segment weighs nothing."""
+    rows, i = regressor().copy(), 10 * world().person.skeleton.index(segment)
+    rows[..., i : i + 10] = 0.0
+    return rows
+
+
+def distance(phi: np.ndarray) -> np.ndarray:
+    """(150,) from RM, in standard deviations of people."""
+    return np.linalg.solve(world().prior.root, phi - world().prior.phi)

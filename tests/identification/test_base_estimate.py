@@ -15,11 +15,11 @@ from bsip_cli.identification.problem import (
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import (
     equations_of,
-    motion,
     problem_of,
     recording,
     regressor,
     remeasured,
+    standing_still,
     world,
 )
 
@@ -110,11 +110,7 @@ def test_intervals_cover_the_truth_through_the_whole_chain():
 
 def test_what_was_not_excited_stays_with_the_table_and_is_uncertain():
     """A person who stands still shows weight and centre of mass only."""
-    q, v, a = motion(30.0)
-    still = wrench_regressor(
-        world().model, world().model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3)
-    )
-    rows = np.repeat(still, 50, axis=0)
+    rows = standing_still(50)
     fit = base_parameters(problem_of(rows, rows @ world().phi_true, 1.0))
     true = world().basis.combine @ world().phi_true
     assert fit.values[0] == pytest.approx(true[0], rel=1e-6)  # the mass of the whole body

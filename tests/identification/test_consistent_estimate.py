@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from bsip_cli.body.inertia import from_phi, from_readable
-from bsip_cli.dynamics.ground_wrench import predicted_wrench, wrench_regressor
+from bsip_cli.dynamics.ground_wrench import predicted_wrench
 from bsip_cli.identification.consistent import (
     Weights,
     are_physical,
@@ -16,12 +16,17 @@ from bsip_cli.identification.consistent import (
 )
 from bsip_cli.identification.prior import likeliest
 from bsip_cli.identification.uncertainty import readable
-from tests.identification.synthetic_identification import motion, problem_of, regressor, world
-
-
-def distance(phi):
-    """From RM, in standard deviations of people."""
-    return np.linalg.solve(world().prior.root, phi - world().prior.phi)
+from tests.body.standing_person import parameters_of
+from tests.identification.synthetic_identification import (
+    distance,
+    motion,
+    noisy_problem,
+    problem_of,
+    regressor,
+    standing_still,
+    without_segment,
+    world,
+)
 
 
 def test_rich_noise_free_data_are_reproduced():
@@ -47,19 +52,8 @@ def test_almost_no_data_leave_rm_and_say_so():
     assert "the table the rest" in found.note
 
 
-def standing():
-    """A person who stands still for a while."""
-    q, v, a = motion(30.0)
-    model = world().model
-    still = wrench_regressor(model, model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3))
-    return np.repeat(still, 200, axis=0)
-
-
 def test_standing_still_tells_the_mass_and_leaves_the_rest():
-    rows = standing()
-    rng = np.random.default_rng(4)
-    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
-    found = estimate(problem_of(rows, measured, 3.0))
+    found = estimate(noisy_problem(standing_still(200), 3.0, seed=4))
     total = world().phi_true[::10].sum()
     assert found.phi[::10].sum() == pytest.approx(total, abs=0.1)
     assert "too little motion" in found.note
@@ -69,12 +63,8 @@ def test_standing_still_tells_the_mass_and_leaves_the_rest():
 
 def test_one_arm_that_never_moved_stays_near_the_table():
     """Its rows are empty: nothing but the scale's total speaks about it."""
-    rows = regressor().copy()
     arm = 10 * world().person.skeleton.index("forearm_l")
-    rows[..., arm : arm + 10] = 0.0
-    rng = np.random.default_rng(5)
-    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
-    found = estimate(problem_of(rows, measured, 3.0))
+    found = estimate(noisy_problem(without_segment("forearm_l"), 3.0, seed=5))
     body, table = (from_phi(x[arm : arm + 10]) for x in (found.phi, world().prior.phi))
     assert body.mass_kg == pytest.approx(table.mass_kg, rel=0.05)
     np.testing.assert_allclose(body.com_m, table.com_m, atol=1e-3)
@@ -124,9 +114,7 @@ def drawn(scale, rng):
 
 
 def parameters(rows):
-    origins = world().prior.origin_in_joint_m
-    bodies = [from_readable(row) for row in rows]
-    return np.concatenate([b.moved(-o).phi() for b, o in zip(bodies, origins, strict=True)])
+    return parameters_of(world().person, [from_readable(row) for row in rows])
 
 
 def test_the_spread_of_a_person_is_found():
@@ -184,11 +172,6 @@ def test_intervals_cover_the_truth():
 
 
 def test_data_that_are_trusted_less_leave_more_to_the_table():
-    rows = regressor()
-    rng = np.random.default_rng(10)
-    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
-    shares = [
-        readable(estimate(problem_of(rows, measured, 3.0, ratio)), world().prior).share.mean()
-        for ratio in (1.0, 4.0, 16.0)
-    ]
+    problems = (noisy_problem(regressor(), 3.0, 10, trust_ratio=x) for x in (1.0, 4.0, 16.0))
+    shares = [readable(estimate(one), world().prior).share.mean() for one in problems]
     assert shares[0] > shares[1] > shares[2] > 0

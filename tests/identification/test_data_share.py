@@ -7,7 +7,12 @@ import pytest
 
 from bsip_cli.identification.hansen2017 import estimate
 from bsip_cli.identification.uncertainty import beforehand, excitation, in_words, readable
-from tests.identification.synthetic_identification import problem_of, regressor, world
+from tests.identification.synthetic_identification import (
+    problem_of,
+    regressor,
+    without_segment,
+    world,
+)
 
 
 def problem(stride: int = 25, noise: float = 5.0):
@@ -51,9 +56,7 @@ def test_data_that_are_trusted_less_decide_less():
 
 def test_combinations_that_the_data_know():
     """A segment that hangs without weight in the wrench is not excited; the others are."""
-    rows = regressor().copy()
-    arm = world().person.skeleton.index("forearm_l")
-    rows[..., 10 * arm : 10 * arm + 10] = 0.0
+    rows, arm = without_segment("forearm_l"), world().person.skeleton.index("forearm_l")
     found = excitation(problem_of(rows, rows @ world().phi_true, 5.0))
     assert found.combinations[arm] == 0
     assert np.all(np.delete(found.combinations, arm) > 0)

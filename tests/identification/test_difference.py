@@ -8,7 +8,7 @@ import pytest
 from bsip_cli.body.person import load_parameters
 from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.problem import Estimate, Problem
-from tests.identification.synthetic_identification import problem_of, regressor, world
+from tests.identification.synthetic_identification import problem_of, regressor, remeasured, world
 
 NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 DRAWS = 200
@@ -39,8 +39,7 @@ def draws(seeds: tuple[int, int]):
         pair = []
         for r, phi, problem in zip(rows, (person, person + load_phi()), empty, strict=True):
             measured = r @ phi + NOISE * rng.standard_normal(r.shape[:2])
-            right = np.stack([r[:, c].T @ measured[:, c] for c in range(6)])
-            equations = replace(problem.equations, right=right, squares=(measured**2).sum(axis=0))
+            equations = remeasured(problem.equations, r, measured)
             pair.append(replace(problem, equations=equations))
         yield tuple(pair)
 

@@ -7,16 +7,13 @@ from bsip_cli.identification.hansen2017 import estimate
 from bsip_cli.identification.uncertainty import excitation, readable
 from tests.identification.synthetic_identification import (
     MASS_KG,
+    distance,
     motion,
     problem_of,
     regressor,
+    without_segment,
     world,
 )
-
-
-def distance(phi):
-    """From RM, in standard deviations of people."""
-    return np.linalg.solve(world().prior.root, phi - world().prior.phi)
 
 
 @pytest.fixture(scope="module")
@@ -190,8 +187,7 @@ def test_excitation_names_what_moved():
     )
     assert np.all((lively.segment_share > 0) & (lively.segment_share < 1))
     arm = world().person.skeleton.index("forearm_l")
-    silent = rows.copy()
-    silent[..., 10 * arm : 10 * arm + 10] = 0.0
+    silent = without_segment("forearm_l")
     held = excitation(problem_of(silent, silent @ world().phi_true, 5.0))
     assert held.segment_share[arm] < 0.003  # the masses' sum tells a little
     assert lively.segment_share[arm] > 0.1

@@ -19,7 +19,12 @@ from bsip_cli.identification.consistent import (
     pseudo_inertias,
     terms_of,
 )
-from tests.identification.synthetic_identification import problem_of, regressor, world
+from tests.identification.synthetic_identification import (
+    noisy_problem,
+    problem_of,
+    regressor,
+    world,
+)
 
 
 def objective(problem, gamma=0.5):
@@ -28,10 +33,7 @@ def objective(problem, gamma=0.5):
 
 
 def noisy(seed=1, samples=500, noise=3.0):
-    rows = regressor()[:samples]
-    rng = np.random.default_rng(seed)
-    measured = rows @ world().phi_true + rng.normal(0, noise, rows.shape[:2])
-    return problem_of(rows, measured, noise)
+    return noisy_problem(regressor()[:samples], noise, seed)
 
 
 def test_derivatives_against_finite_differences():

@@ -7,15 +7,20 @@ import pytest
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification.mass_factor import estimate
+from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import readable
-from tests.identification.synthetic_identification import problem_of, regressor, world
+from tests.identification.synthetic_identification import (
+    noisy_problem,
+    problem_of,
+    regressor,
+    world,
+)
 
 NOISE = np.array([8.0, 8.0, 8.0, 4.0, 4.0, 4.0])
 
 
-def measured(phi: np.ndarray, seed: int) -> np.ndarray:
-    rows = regressor()
-    return rows @ phi + np.random.default_rng(seed).normal(0.0, NOISE, rows.shape[:2])
+def noisy(phi: np.ndarray, seed: int = 1) -> Problem:
+    return noisy_problem(regressor(), NOISE, seed, phi)
 
 
 def factor_and_sd(found) -> tuple[float, float]:
@@ -29,7 +34,7 @@ def test_the_number_is_found_and_its_interval_covers():
     truth = 1.05 * world().prior.phi
     hits = []
     for seed in range(200):
-        found = estimate(problem_of(regressor(), measured(truth, seed), NOISE))
+        found = estimate(noisy(truth, seed))
         factor, sd = factor_and_sd(found)
         assert found.phi == pytest.approx(factor * world().prior.phi)
         assert factor == pytest.approx(1.05, abs=5 * sd)
@@ -40,20 +45,17 @@ def test_the_number_is_found_and_its_interval_covers():
 
 def test_what_the_number_leaves_widens_its_interval():
     """Another body errs by more than the noise says."""
-    noise = [
-        problem_of(regressor(), measured(phi, 1), NOISE)
-        for phi in (1.05 * world().prior.phi, world().phi_true)
-    ]
-    (_, like_table), (_, other) = (factor_and_sd(estimate(problem)) for problem in noise)
+    problems = [noisy(1.05 * world().prior.phi), noisy(world().phi_true)]
+    (_, like_table), (_, other) = (factor_and_sd(estimate(problem)) for problem in problems)
     assert other > 1.5 * like_table
-    trusted_less = replace(noise[0], trust_ratio=4.0)
+    trusted_less = replace(problems[0], trust_ratio=4.0)
     assert factor_and_sd(estimate(trusted_less))[1] == pytest.approx(4 * like_table)
 
 
 def test_segments_keep_the_tables_spread():
     """The number says nothing of a single segment beside what the sum of masses says."""
     prior = world().prior
-    found = readable(estimate(problem_of(regressor(), measured(prior.phi, 1), NOISE)), prior)
+    found = readable(estimate(noisy(prior.phi)), prior)
     assert found.share[:, 1:4] == pytest.approx(0.0, abs=1e-9)
     assert found.sd[:, 1:4] == pytest.approx(prior.readable_sd[:, 1:4])
     assert (found.sd[:, 0] > 0.8 * prior.readable_sd[:, 0]).all()
@@ -72,4 +74,4 @@ def test_segments_without_markers_are_scaled_too():
 
 def test_forces_that_push_upwards_have_no_such_body():
     with pytest.raises(NumericalError, match="above 0"):
-        estimate(problem_of(regressor(), measured(-world().prior.phi, 1), NOISE))
+        estimate(noisy(-world().prior.phi))

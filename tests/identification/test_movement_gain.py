@@ -219,22 +219,12 @@ def test_each_side_has_its_own_words():
     assert not any("{" in movement.text + movement.name for movement in BY_NAME.values())
 
 
-def test_joints_that_no_marker_shows_are_not_asked_for():
+def test_joints_that_no_marker_shows_or_the_skeleton_lacks_are_not_asked_for():
     person = world().person
     held = np.array([joint == "wrist_l" for joint in person.skeleton.joints])
-    blind = replace(person, held=held)
-    names = {name for name, movement in BY_NAME.items() if possible(movement, blind)}
-    assert set(BY_NAME) - names == {"wrists_l"}
-
-
-def test_joints_that_the_skeleton_lacks_are_not_asked_for():
-    person = world().person
     joints = tuple(name.replace("neck", "nape") for name in person.skeleton.joints)
-    other = replace(person, skeleton=replace(person.skeleton, joints=joints))
-    names = {name for name, movement in BY_NAME.items() if possible(movement, other)}
-    assert set(BY_NAME) - names == {
-        "head_nods",
-        "head_turns",
-        "head_tilts",
-        "head_circles",
-    }
+    without_neck = replace(person, skeleton=replace(person.skeleton, joints=joints))
+    of_the_head = {"head_nods", "head_turns", "head_tilts", "head_circles"}
+    for other, lost in ((replace(person, held=held), {"wrists_l"}), (without_neck, of_the_head)):
+        names = {name for name, movement in BY_NAME.items() if possible(movement, other)}
+        assert set(BY_NAME) - names == lost

@@ -7,14 +7,11 @@ from scipy.optimize import minimize
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.robert2017 import estimate, programme_of, solve
 from bsip_cli.identification.uncertainty import readable
-from tests.identification.synthetic_identification import problem_of, regressor, world
+from tests.identification.synthetic_identification import noisy_problem, regressor, world
 
 
 def noisy(noise=3.0, seed=1, phi=None):
-    rows = regressor()
-    rng = np.random.default_rng(seed)
-    phi = world().phi_true if phi is None else phi
-    return problem_of(rows, rows @ phi + rng.normal(0, noise, rows.shape[:2]), noise)
+    return noisy_problem(regressor(), noise, seed, phi)
 
 
 def by_scipy(programme):

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.base_parameters import find_basis
+from bsip_cli.dynamics.base_parameters import Basis, find_basis
 from bsip_cli.identification.base import base_parameters
-from bsip_cli.identification.prior import prior_of
+from bsip_cli.identification.prior import Prior, prior_of
 from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import excitation, readable
 from tests.body.standing_person import standing
@@ -44,13 +44,13 @@ def headless() -> Problem:
     known = prior.fixed_parameters()
     truth = np.where(known, 1.2 * prior.phi, world().phi_true)
     rows = regressor()[::10]
-    whole = problem_of(rows, rows @ truth, 2.0)
-    return replace(
-        whole,
-        equations=whole.equations.with_known(prior.phi, known),
-        prior=prior,
-        basis=find_basis(world().model, known),
-    )
+    return with_known(problem_of(rows, rows @ truth, 2.0), prior, find_basis(world().model, known))
+
+
+def with_known(whole: Problem, prior: Prior, basis: Basis) -> Problem:
+    """Once the segments without markers are taken for the table's."""
+    equations = whole.equations.with_known(prior.phi, prior.fixed_parameters())
+    return replace(whole, equations=equations, prior=prior, basis=basis)
 
 
 def head() -> int:
@@ -93,12 +93,7 @@ def test_the_others_explain_what_is_left_of_the_wrench():
     truth = np.where(known, prior.phi, world().phi_true)
     rows = regressor()
     whole = problem_of(rows, rows @ truth, 1.0)
-    problem = replace(
-        whole,
-        equations=whole.equations.with_known(prior.phi, known),
-        prior=prior,
-        basis=headless().basis,
-    )
+    problem = with_known(whole, prior, headless().basis)
     fit = base_parameters(problem)
     np.testing.assert_allclose(fit.values, problem.basis.combine @ truth, atol=1e-5)
     np.testing.assert_allclose(

@@ -58,5 +58,16 @@ def fitted(markers: np.ndarray, times: np.ndarray) -> MarkerFit:
     return marker_fit(PERSON, markers, q, times, **SCALES)
 
 
+def exchange(markers: np.ndarray, a: str, b: str, frames: slice) -> None:
+    """Give two markers each other's labels, in place."""
+    pair = [MARKERS.index(a), MARKERS.index(b)]
+    markers[frames, pair] = markers[frames, pair[::-1]]
+
+
+def markers_on(*segments: str) -> list[str]:
+    on = zip(MARKERS, PERSON.marker_segments, strict=True)
+    return [label for label, k in on if PERSON.skeleton.segments[k] in segments]
+
+
 def events_of(times: np.ndarray, markers: np.ndarray, filled: np.ndarray | None = None):
     return marker_evidence(fitted(markers, times), fitted, filled).events

@@ -15,14 +15,14 @@ from bsip_cli.motion.marker_exchange import (
     misfit_m,
     refitted,
 )
-from tests.marker_evidence.swinging_markers import MARKERS, PERSON, fitted, recording
-
-ARM = ("upper_arm_r", "forearm_r", "hand_r")
-
-
-def exchange(markers: np.ndarray, a: str, b: str, frames: slice) -> None:
-    pair = [MARKERS.index(a), MARKERS.index(b)]
-    markers[frames, pair] = markers[frames, pair[::-1]]
+from tests.marker_evidence.swinging_markers import (
+    MARKERS,
+    PERSON,
+    exchange,
+    fitted,
+    markers_on,
+    recording,
+)
 
 
 def judged(markers: np.ndarray, times: np.ndarray, filled: np.ndarray | None = None) -> Evidence:
@@ -106,11 +106,7 @@ def test_right_labels_stay(seed):
 
 def test_of_an_exchanged_arm_the_marker_that_kept_its_label_keeps_it():
     times, clean, _ = recording(5)
-    right = [
-        label
-        for label, k in zip(MARKERS, PERSON.marker_segments, strict=True)
-        if PERSON.skeleton.segments[k] in ARM
-    ]
+    right = markers_on("upper_arm_r", "forearm_r", "hand_r")
     markers = clean.copy()
     for label in right:
         if label != "RUA":

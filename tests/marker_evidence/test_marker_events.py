@@ -9,7 +9,14 @@ import pytest
 
 from bsip_cli.motion import marker_evidence
 from bsip_cli.motion.marker_events import MarkerEvent, offsets, summaries
-from tests.marker_evidence.swinging_markers import MARKERS, PERSON, events_of, fitted, recording
+from tests.marker_evidence.swinging_markers import (
+    MARKERS,
+    events_of,
+    exchange,
+    fitted,
+    markers_on,
+    recording,
+)
 
 START, STOP = 160, 175  # frames: 3.2 to 3.5 s
 
@@ -123,10 +130,7 @@ PAIRS = [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB")]
 def test_exchanged_labels(a, b, frames):
     times, clean, _ = recording(4)
     markers, pair = clean.copy(), [MARKERS.index(a), MARKERS.index(b)]
-    markers[frames, pair[0]], markers[frames, pair[1]] = (
-        clean[frames, pair[1]],
-        clean[frames, pair[0]],
-    )
+    exchange(markers, a, b, frames)
     event = only(events_of(times, markers))
     assert event.kind == "swap"
     assert {event.marker, event.partner} == {a, b}
@@ -139,17 +143,11 @@ def test_exchanged_labels(a, b, frames):
 
 def test_both_arms_exchanged_throughout():
     times, clean, _ = recording(5)
-    arms = ("upper_arm", "forearm", "hand")
-    right = [
-        label
-        for label, k in zip(MARKERS, PERSON.marker_segments, strict=True)
-        if PERSON.skeleton.segments[k] in {f"{name}_r" for name in arms}
-    ]
+    right = markers_on("upper_arm_r", "forearm_r", "hand_r")
     assert len(right) == 6
     markers = clean.copy()
     for label in right:
-        a, b = MARKERS.index(label), MARKERS.index(f"L{label[1:]}")
-        markers[:, a], markers[:, b] = clean[:, b], clean[:, a]
+        exchange(markers, label, f"L{label[1:]}", slice(None))
     events = events_of(times, markers)
     assert {(one.kind, one.marker, one.partner) for one in events} == {
         ("swap", label, f"L{label[1:]}") for label in right

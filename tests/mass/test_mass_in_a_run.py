@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.artifacts import read_artifact
 from bsip_cli.commands.show import shown
-from bsip_cli.config import load_config
-from bsip_cli.pipeline import STAGES
-from bsip_cli.running.runner import Outcome, perform
-from bsip_cli.running.unit import Unit
+from bsip_cli.running.runner import Outcome
 from bsip_cli.simulate.options import Laboratory
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.stages.person_mass import StatedMass, stated_mass
-from bsip_cli.study.study import load_study
-from tests.small_study import small
+from tests.small_study import Run, small
 
 OPTIONS = replace(small("F", 11, static=1.5, squat=3.0), laboratory=Laboratory(plate_per_foot=True))
 STATIC, SQUAT = "sub-01_task-static", "sub-01_task-squat_run-1"
@@ -28,37 +22,21 @@ CASES = Path(__file__).parents[2].parent / "shared" / "cases"
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("mass") / "study"
-    simulate_study(folder, OPTIONS)
-    return folder
+def recorded(tmp_path_factory) -> MassRun:
+    run = MassRun.within(tmp_path_factory.mktemp("mass"))
+    simulate_study(run.study, OPTIONS)
+    return run
 
 
 TRUE_KG = participant_person(OPTIONS, 1).mass_kg
 
 
-@dataclass(frozen=True)
-class Run:
-    study: Path
-    out: Path
-
+class MassRun(Run):
     def state(self, mass: object, ingest: str = "") -> None:
         """Write what participants.tsv says, and options of ingest."""
         header = "participant_id\tsex\tmass_kg\theight_m\n"
         (self.study / "participants.tsv").write_text(f"{header}sub-01\tF\t{mass}\t1.65\n")
         (self.study / "study.toml").write_text(f'marker_set = "hansen2017"\n[ingest]\n{ingest}\n')
-
-    def perform(self, stage: str, stem: str = "") -> Outcome:
-        return perform(self.unit(stage, stem))
-
-    def unit(self, stage: str, stem: str = "") -> Unit:
-        config = load_config([self.study / "study.toml"])
-        found, _ = load_study(self.study, config.roles.model_dump())
-        person = found.participants[0]
-        trial = next((one for one in person.trials if one.stem == stem), None)
-        level = "trial" if stem else "participant"
-        first = next(one for one in STAGES if (one.name, one.level) == (stage, level))
-        return Unit(first, found, self.out, config, person, trial)
 
     def ingest(self, *stems: str) -> list[Outcome]:
         """The session first, then these trials."""
@@ -73,14 +51,10 @@ class Run:
         assert done.state == "done"
         return done
 
-    def read(self, kind: str, owner: str = "sub-01") -> pd.DataFrame:
-        return read_artifact(self.out / "sub-01" / f"{owner}_{kind}.parquet", kind)
-
 
 @pytest.fixture
-def run(recorded, tmp_path) -> Run:
-    shutil.copytree(recorded, tmp_path / "study")
-    return Run(tmp_path / "study", tmp_path / "out")
+def run(recorded, tmp_path) -> MassRun:
+    return recorded.copied_to(tmp_path)
 
 
 @pytest.mark.parametrize("trials", [(STATIC,), (SQUAT,), (STATIC, SQUAT)])

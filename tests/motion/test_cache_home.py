@@ -60,16 +60,11 @@ def test_without_a_home_it_is_the_users_alone(temporary):
     assert stat.S_IMODE(own(temporary).stat().st_mode) == 0o700
 
 
-def test_a_folder_of_another_user_is_not_taken(temporary, monkeypatch):
-    me = os.geteuid()
-    monkeypatch.setattr(os, "geteuid", lambda: me + 1)
-    assert cache_home() is None
-
-
-def test_a_home_of_another_user_is_not_taken(temporary, tmp_path, monkeypatch):
+@pytest.mark.parametrize("home", ["file/home", "home"])
+def test_a_folder_or_home_of_another_user_is_not_taken(temporary, tmp_path, monkeypatch, home):
     """``sudo`` may leave the caller's HOME."""
     me = os.geteuid()
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("HOME", str(tmp_path / home))
     monkeypatch.setattr(os, "geteuid", lambda: me + 1)
     assert cache_home() is None
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import rigid_motion
-from bsip_cli.motion.calibration import functional_joint
+from bsip_cli.motion.calibration import FunctionalJoint, functional_joint
 
 CENTRE, AXIS = np.array([0.1, 0.2, 0.5]), np.array([0.1, 1.0, 0.2]) / np.sqrt(1.05)
 THIGH = np.array([[0.1, 0.1, 0.9], [0.15, 0.2, 0.8], [0.05, 0.25, 0.7], [0.1, 0.3, 0.75]])
@@ -27,37 +27,32 @@ def hinge(n: int = 120, noise_m: float = 0.0, swing_rad: float = 0.8):
     return moved[:, :4], moved[:, 4:]
 
 
-def test_a_hinge_without_noise():
-    joint = functional_joint(*hinge(), THIGH, SHANK)
+def joint_of(n: int = 120, noise_m: float = 0.0) -> tuple[FunctionalJoint, float]:
+    """The joint that a hinge shows, and how far it lies beside the axis [m]."""
+    joint = functional_joint(*hinge(n, noise_m), THIGH, SHANK)
     assert joint is not None
-    assert abs(joint.axis @ AXIS) == pytest.approx(1.0)
     beside = joint.point - CENTRE
-    assert np.linalg.norm(beside - (beside @ AXIS) * AXIS) < 1e-9
-    assert joint.residual_m < 1e-9
+    return joint, float(np.linalg.norm(beside - (beside @ AXIS) * AXIS))
+
+
+def test_a_hinge_without_noise():
+    joint, beside_m = joint_of()
+    assert abs(joint.axis @ AXIS) == pytest.approx(1.0)
+    assert beside_m < 1e-9 and joint.residual_m < 1e-9
     assert joint.turned_rad == pytest.approx(0.8, abs=0.01)
 
 
-def test_the_point_of_the_axis_nearest_to_a_line():
-    joint = functional_joint(*hinge(), THIGH, SHANK)
-    assert joint is not None
-    up = np.array([0.0, 0.0, 0.4])
-    found = joint.nearest_to(CENTRE + up, CENTRE - up)
-    np.testing.assert_allclose(found, CENTRE, atol=1e-9)
-
-
-def test_where_the_axis_meets_a_plane():
-    joint = functional_joint(*hinge(), THIGH, SHANK)
-    assert joint is not None
-    ahead, _, up = np.eye(3)
-    found = joint.in_plane(CENTRE, CENTRE + 0.3 * ahead, CENTRE + 0.3 * up)
-    np.testing.assert_allclose(found, CENTRE, atol=1e-9)
+def test_the_point_of_the_axis_nearest_to_a_line_and_in_a_plane():
+    (joint, _), (ahead, _, up) = joint_of(), np.eye(3)
+    nearest = joint.nearest_to(CENTRE + 0.4 * up, CENTRE - 0.4 * up)
+    np.testing.assert_allclose(nearest, CENTRE, atol=1e-9)
+    inside = joint.in_plane(CENTRE, CENTRE + 0.3 * ahead, CENTRE + 0.3 * up)
+    np.testing.assert_allclose(inside, CENTRE, atol=1e-9)
 
 
 def test_noise_of_skin_leaves_millimetres():
-    joint = functional_joint(*hinge(400, noise_m=0.003), THIGH, SHANK)
-    assert joint is not None
-    beside = joint.point - CENTRE
-    assert np.linalg.norm(beside - (beside @ AXIS) * AXIS) < 0.01
+    joint, beside_m = joint_of(400, noise_m=0.003)
+    assert beside_m < 0.01
     assert np.rad2deg(np.arccos(abs(joint.axis @ AXIS))) < 5
     assert 0.001 < joint.residual_m < 0.02
 

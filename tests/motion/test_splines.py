@@ -30,6 +30,13 @@ def butterworth_second(samples, rate_hz, cutoff_hz=10.0):
     return np.gradient(np.gradient(smoothed, 1 / rate_hz, axis=0), 1 / rate_hz, axis=0)
 
 
+def slow(times, hz):
+    """(N,) a sum of sines, and its second derivative."""
+    omega = 2 * np.pi * np.array(hz)
+    waves = 0.1 * np.sin(times[:, None] * omega)
+    return waves.sum(axis=1), -(omega**2 * waves).sum(axis=1)
+
+
 def rms(x):
     return float(np.sqrt(np.mean(np.square(x))))
 
@@ -95,9 +102,7 @@ def test_slow_motion_is_no_noise():
 def test_the_stated_sd_is_the_true_error(rate_hz):
     """In slow phases: at the burst's edges the pace lags and the error is larger for a moment."""
     times = np.arange(round(20 * rate_hz)) / rate_hz
-    frequency = 2 * np.pi * np.array([0.5, 0.9, 1.3])
-    value = (0.1 * np.sin(times[:, None] * frequency)).sum(axis=1)
-    second = -(0.1 * frequency**2 * np.sin(times[:, None] * frequency)).sum(axis=1)
+    value, second = slow(times, [0.5, 0.9, 1.3])
     rng = np.random.default_rng(5)
     samples = value[:, None] + rng.normal(0, NOISE, (len(times), 10))
     found = smooth(samples, rate_hz, WINDOW_S)
@@ -164,9 +169,7 @@ def shaken(rng, times, corner_hz, white):
 def test_knowing_the_skins_noise_helps(rate_hz):
     """And the stated standard deviation of the acceleration is that of its error."""
     times = np.arange(round(20 * rate_hz)) / rate_hz
-    frequency = 2 * np.pi * np.array([0.4, 0.8, 1.1, 1.6])
-    value = (0.1 * np.sin(times[:, None] * frequency)).sum(axis=1)
-    second = -(0.1 * frequency**2 * np.sin(times[:, None] * frequency)).sum(axis=1)
+    value, second = slow(times, [0.4, 0.8, 1.1, 1.6])
     rng = np.random.default_rng(10)
     samples = np.stack([value + shaken(rng, times, 20.0, 1e-4) for _ in range(12)], axis=1)
     inner = (times > 1) & (times < times[-1] - 1)

@@ -400,7 +400,8 @@ def diagnosis(trials: list[str]) -> pd.DataFrame:
     alike = "; other causes look alike here: to distinguish them, pray"
     return frame(
         "rank effect target parameter estimate unit ci_low ci_high p_value gain_percent "
-        "gain_ci_low gain_ci_high verdict class_id sentence trials probability scope rms_change",
+        "gain_ci_low gain_ci_high verdict class_id sentence trials probability scope rms_change "
+        "persons own_estimate own_low own_high",
         _cause(1, "plate_rotation", "1", "yaw", 0.035, "rad", "named", "", turned, everywhere),
         _cause(1, "plate_rotation", "1", "tilt", 0.0, "rad", "named", "", turned, everywhere),
         _cause(
@@ -429,7 +430,7 @@ def _cause(
     scope = {"plate": "laboratory", "added": "person", "wobbling": "person"}
     what = (rank, effect, target, parameter, estimate, unit, low, high, 1 - probability)
     said = (gain, gain / 2, 1.5 * gain, verdict, class_id, sentence, trials)
-    return (*what, *said, probability, scope[effect.split("_")[0]], 12.0 / rank)
+    return (*what, *said, probability, scope[effect.split("_")[0]], 12.0 / rank, 0, *[np.nan] * 3)
 
 
 def error_budget(trials: list[str]) -> pd.DataFrame:

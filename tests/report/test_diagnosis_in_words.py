@@ -252,16 +252,17 @@ def test_an_interval_has_a_sign_where_its_sentence_has_one(found):
     assert candidates_of(drift)[0].in_words() == "by −0.02 N (95 % interval −0.0210 to −0.0190 N/s)"
 
 
-def test_a_regularity_without_a_name_has_a_label(found):
-    spring = found[found["rank"] == 2].assign(
-        effect=UNNAMED, target="y by z", parameter="stiffness"
-    )
-    assert (
-        candidates_of(spring)[0].label
-        == "error of unknown cause: pull on the pelvis along Y, growing along Z"
-    )
-    swing = spring.assign(target="fx", parameter="amplitude")
-    assert candidates_of(swing)[0].label == "error of unknown cause: swing, force x"
+def test_an_error_without_a_name_has_a_label(found):
+    unnamed = found[found["rank"] == 2].assign(effect=UNNAMED, parameter="error")
+    labels = {
+        "fz by load": "vertical force, along with the load",
+        "all by time": "all components, along with the time in the trial",
+        "fx": "force x",
+        "1 fz": "plate 1, vertical force",
+    }
+    for target, label in labels.items():
+        (one,) = candidates_of(unnamed.assign(target=target))
+        assert one.label == f"error of unknown cause: {label}"
 
 
 def test_the_table_says_what_came_near(found):

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from bsip_cli.commands.show import shown
+from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.report.blocks import Links, Numbered
 from bsip_cli.report.candidates import candidates_of, causes_of
 from bsip_cli.report.effect_words import effect_title
@@ -28,6 +29,7 @@ from bsip_cli.report.recordings import (
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import cause_line, cause_text, consequences
+from bsip_cli.stages.diagnose_trial import rows_of
 from bsip_cli.stages.report import record_of
 from tests.report.fake_study import Artifacts, diagnosis
 
@@ -307,7 +309,7 @@ def test_a_fault_says_what_it_changes_at_the_joints(record):
         "changes the left knee's moment by 9 % of its peak"
     )
     small = peaks.assign(change_percent=0.4)
-    assert moment_change(causes[0], causes, small) == "changes no joint moment by 1 %"
+    assert moment_change(causes[0], causes, small) == "changes no joint moment by as much as 1 %"
     assert moment_change(causes[0], causes, pd.DataFrame()) == ""
     other = causes_of(candidates_of(fault("sync_offset", SEQUENCE)))
     assert moment_change(other[0], other, peaks) == ""
@@ -325,21 +327,33 @@ def test_of_two_alike_in_one_recording_no_change_is_known(record):
 @pytest.mark.parametrize(
     ("own", "short", "full"),
     [
-        ("", "share it.", "share it."),
+        ({}, "share it.", "share it."),
         (
-            ", and this person's recordings alone leave it open: 6 ms, 95 % interval -4 to 16 ms",
+            {"own_estimate": 0.006, "own_low": -0.004, "own_high": 0.016},
             "share it (this person alone: 6 ms).",
             "share it (this person alone: 6 ms, 95 % interval −4 to 16 ms).",
         ),
     ],
 )
 def test_of_two_sizes_it_is_said_with_which_to_correct(own, short, full):
-    said = f"plate 1 is turned; this is known from the laboratory (7 persons){own}"
-    (cause,) = causes_of(candidates_of(TURNED.assign(sentence=said)))
+    said = "plate 1 is turned; this is known from the laboratory (7 persons), as is said there"
+    late = TURNED.assign(sentence=said, parameter="delay", unit="s", persons=7, **own)
+    (cause,) = causes_of(candidates_of(late))
     correct = "Correct with this size, as 7 persons of the laboratory "
     assert cause_line(cause, TRIALS).endswith(f"probability 99.5 %. {correct}{short}")
     assert cause_text(cause, TRIALS).endswith(f"{correct}{full}")
     assert "known from" not in cause_line(cause, TRIALS) + cause_text(cause, TRIALS)
+
+
+def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
+    sizes = Number("y", "m", 0.001), Number("x", "m", 0.02, 0.019, 0.021)
+    own = Number("x", "m", 0.018, 0.01, 0.026)
+    said = sizes, "plate 1 is shifted", 0.01, 0.99
+    shared = Finding("plate_translation", "1", (SEQUENCE,), *said, persons=7, own=own)
+    mine = Finding("plate_translation", "2", (SEQUENCE,), *said)
+    first, second = candidates_of(rows_of((shared, mine), (SEQUENCE,)))
+    assert first.persons == 7 and vars(first.own) == vars(own)
+    assert second.persons == 0 and second.own is None and not second.which_size()
 
 
 def test_errors_by_other_parameters_stand_beside(record):

@@ -200,5 +200,5 @@ def test_a_person_without_report_has_no_link():
 
 
 def test_what_the_laboratory_tells_of_itself_is_not_shared_again():
-    known = TURNED.assign(sentence=TURNED["sentence"] + "; this is known from the laboratory (2)")
+    known = TURNED.assign(persons=2)
     assert shared(ann=known, eve=known) == ()

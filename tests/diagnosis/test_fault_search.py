@@ -16,7 +16,7 @@ from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
-from bsip_cli.effects.nameless import NAMELESS
+from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
 from bsip_cli.effects.scene import Scene
 from tests.diagnosis.noisy_trial import (
     late,
@@ -161,6 +161,28 @@ def test_plates_that_are_moved_in_the_middle_of_two_trials_are_uneven(seed):
 
     assert moved_from(-1.0) < 0
     assert moved_from(4.9) > 5
+
+
+def pulled(scene: Scene, mean_N: float, varying_N: float) -> Scene:
+    """By a force on the pelvis along x that hangs on its height."""
+    height = scene.q[:, 2] - scene.q[scene.valid, 2].mean()
+    force = np.zeros((len(height), 3))
+    force[:, 0] = mean_N + varying_N * height / height[scene.valid].std()
+    return shown(scene, np.hstack([force, np.cross(scene.q[:, :3], force)]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_an_error_without_a_name_is_on_average_has_no_name(seed):
+    """Neither a tilt nor a plate's zero is sure beside a pull that hangs on where the pelvis is."""
+    findings = told(found_in(pulled(movement(seed), 12.0, 12.0)))
+    assert findings and {one.effect for one in findings if one.verdict == "named"} <= {UNEXPLAINED}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_zero_far_larger_than_what_has_no_name_keeps_its_name(seed):
+    scene = with_effect(pulled(movement(seed), 0.0, 2.0), EFFECTS["plate_zero"], "1 fx", 25.0)
+    named = {(one.effect, one.target) for one in told(found_in(scene)) if one.verdict == "named"}
+    assert ("plate_zero", "1 fx") in named
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.effects.nameless import NAMELESS, Course, in_channel, signal_of
+from bsip_cli.effects.nameless import NAMELESS, Course, Mean, in_channel, signal_of
 from bsip_cli.effects.plates import CHANNELS
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 from tests.diagnosis.noisy_trial import part_of_moving
@@ -137,3 +137,16 @@ def test_what_an_error_goes_along_with_is_said(scene):
     assert one.endswith("N (RMS) that goes along with the load")
     (name, unit, size), _ = Course().reported(scene, "all by time", np.ones(24))
     assert (name, unit) == ("force", "N") and size > 1
+
+
+def test_a_mean_is_constant_about_where_the_person_stands(scene):
+    mean = Mean({"fx": 5.0, "my": 2.0})
+    change = mean.change(scene, Mean.target_of("all by load"), np.array([3.0, -4.0]))
+    for channel, size in {"fx": 3.0, "fz": 0.0, "my": -4.0, "mz": 0.0}.items():
+        np.testing.assert_allclose(signal_of(scene, change, channel), size, atol=1e-9)
+
+
+def test_a_mean_in_words(scene):
+    one = Mean({"mz": 2.0})
+    said = one.sentence(scene, "mz by mean", np.array([-3.0]))
+    assert said.startswith("of unknown cause: a constant error of") and "-3.0 N m" in said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -146,15 +147,19 @@ def reordered(labelling: Labelling, refit: Refit) -> Labelling:
         seen = np.isfinite(fit.measured_m[frames][:, mine, 0]).all(axis=1)
         if not _FEWEST <= len(mine) <= _MOST_MARKERS or not seen.any():
             continue
+        rigid = partial(_rigid_misfits_m, fit.measured_m[frames[seen]][:, mine], fit.place_m[mine])
+        as_labelled = float(rigid(np.arange(len(mine))[None])[0])
+        if as_labelled < limit:
+            continue
         orders = np.array(list(permutations(range(len(mine)))))
-        misfits = _rigid_misfits_m(fit.measured_m[frames[seen]][:, mine], fit.place_m[mine], orders)
-        likely = [k for k in np.argsort(misfits) if misfits[k] < _NEARER * misfits[0]][:_LIKELY]
-        if misfits[0] < limit or not likely:
+        misfits = rigid(orders)
+        likely = [k for k in np.argsort(misfits) if misfits[k] < _NEARER * as_labelled][:_LIKELY]
+        if not likely:
             continue
         tried = []
         for k in likely:
             exchanges = [
-                Exchange(a, b, whole, float(misfits[0] / misfits[k]))
+                Exchange(a, b, whole, as_labelled / float(misfits[k]))
                 for a, b in _transpositions(mine, orders[k])
             ]
             some = refit(with_exchanges(fit, exchanges)[frames], fit.times_s[frames])

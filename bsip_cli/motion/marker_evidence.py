@@ -7,7 +7,8 @@ recording; and the spread of the marker's own residual in its segment. What is f
 swap (marker_exchange.py)
     Both markers lie at least twice as near to the other's place in the model as to their own, or
     the line between them reverses from one frame to the next; or both arms
-    (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model,
+    (legs) fit twice as well exchanged; or the markers of a segment lie on their places in another
+    order. Where all markers involved then lie nearer to the model,
     the labels are corrected and the poses fitted again before the rest is judged; else they stay
     as recorded.
 jump
@@ -50,6 +51,7 @@ from bsip_cli.motion.marker_exchange import (
     exchanged_back,
     misfit_m,
     refitted,
+    reordered,
     swaps,
     with_exchanges,
 )
@@ -410,7 +412,7 @@ def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray | None = No
     filled : (N, m) positions that were estimated over a gap: they may jump, but are no evidence
         of slips and offsets.
     """
-    labelling = swaps(swapped_limbs(fit, refit), refit)
+    labelling = swaps(reordered(swapped_limbs(fit, refit), refit), refit)
     fit = labelling.fit
     filled = None if filled is None else exchanged(filled, labelling.order)
     residual = fit.residual_m

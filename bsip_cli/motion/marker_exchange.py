@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import permutations
 
 import numpy as np
 
@@ -80,7 +82,14 @@ def exchanged_back(
             break
         kept, again = nearer, refitted(fit, refit, nearer)
     done = nearer if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()) else []
-    events = []
+    return _labelled(labelling, again, suspected, done)
+
+
+def _labelled(
+    labelling: Labelling, again: MarkerFit, suspected: Sequence[Exchange], done: Sequence[Exchange]
+) -> Labelling:
+    """With the events of all that are suspected, and those that are done, which ``again`` has."""
+    fit, events = labelling.fit, []
     for one in suspected:
         a, b = (fit.measured_m[one.frames, m] for m in (one.a, one.b))
         apart = float(np.nanmedian(np.linalg.norm(a - b, axis=1)))
@@ -112,6 +121,78 @@ def _comes_nearer(one: Exchange, before: MarkerFit, after: MarkerFit) -> bool:
     )
     limit = 3**0.5 * float(before.trusted_m.min())  # trusted in each of three directions
     return all(near < max(far, limit) for near, far in zip(now, was, strict=True))
+
+
+# --- the markers of a segment in another order, throughout ----------------------------------------
+
+
+_FRAMES = 24  # that are looked at
+_FEWEST, _MOST_MARKERS = 4, 7  # of a segment: fewer show no order, more are 5,040 orders
+_LIKELY = 8  # orders that are fitted
+
+
+def reordered(labelling: Labelling, refit: Refit) -> Labelling:
+    """Labels of segments corrected whose markers are each other's, with the events.
+
+    Of labels that are exchanged all together no pair need show it, since the pose follows them.
+    What is rigid does: turned and moved at will, the markers lie on their places at least twice as
+    near in another order as in that of their labels. Poses fitted to some frames tell which of
+    these orders it is, of those that are nearly alike.
+    """
+    fit = labelling.fit
+    frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _FRAMES).astype(int))
+    whole, limit = slice(0, len(fit.times_s)), 3**0.5 * float(fit.trusted_m.min())
+    for segment in dict.fromkeys(fit.segments):
+        mine = np.array([k for k, name in enumerate(fit.segments) if name == segment])
+        seen = np.isfinite(fit.measured_m[frames][:, mine, 0]).all(axis=1)
+        if not _FEWEST <= len(mine) <= _MOST_MARKERS or not seen.any():
+            continue
+        rigid = partial(_rigid_misfits_m, fit.measured_m[frames[seen]][:, mine], fit.place_m[mine])
+        as_labelled = float(rigid(np.arange(len(mine))[None])[0])
+        if as_labelled < limit:
+            continue
+        orders = np.array(list(permutations(range(len(mine)))))
+        misfits = rigid(orders)
+        likely = [k for k in np.argsort(misfits) if misfits[k] < _NEARER * as_labelled][:_LIKELY]
+        if not likely:
+            continue
+        tried = []
+        for k in likely:
+            exchanges = [
+                Exchange(a, b, whole, as_labelled / float(misfits[k]))
+                for a, b in _transpositions(mine, orders[k])
+            ]
+            some = refit(with_exchanges(fit, exchanges)[frames], fit.times_s[frames])
+            tried.append((misfit_m(some.distance_m()), exchanges))
+        _, found = min(tried, key=lambda one: one[0])
+        again = refitted(fit, refit, found)
+        before, after = (misfit_m(one.distance_m()[:, mine]) for one in (fit, again))
+        if after < _NEARER * before and misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):
+            labelling = _labelled(labelling, again, found, found)
+            fit = labelling.fit
+    return labelling
+
+
+def _rigid_misfits_m(measured: np.ndarray, place: np.ndarray, orders: np.ndarray) -> np.ndarray:
+    """(k,) root mean square distance of markers (N, n, 3) from places (n, 3) that are turned and
+    moved onto them, in each order (k, n) of the markers (Kabsch 1976, Acta Cryst A32)."""
+    measured = measured - measured.mean(axis=1, keepdims=True)
+    place = place - place.mean(axis=0)
+    products = np.einsum("fkni,nj->fkij", measured[:, orders], place)
+    left, sizes, right = np.linalg.svd(products)
+    sizes[..., 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
+    squares = (measured**2).sum(axis=(1, 2))[:, None] + (place**2).sum() - 2 * sizes.sum(axis=2)
+    return np.sqrt(np.maximum(squares, 0.0).mean(axis=0) / len(place))
+
+
+def _transpositions(markers: np.ndarray, order: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Exchanges that one after the other bring markers (n,) into an order (n,)."""
+    now = list(range(len(order)))
+    for at, wanted in enumerate(order):
+        other = now.index(wanted)
+        if other != at:
+            now[at], now[other] = now[other], now[at]
+            yield int(markers[at]), int(markers[other])
 
 
 # --- pairs of markers that bear each other's labels for a while or throughout ---------------------

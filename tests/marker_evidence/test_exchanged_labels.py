@@ -25,6 +25,13 @@ from tests.marker_evidence.swinging_markers import (
 )
 
 
+OF_MANY = [
+    name
+    for k, name in enumerate(PERSON.skeleton.segments)
+    if 4 <= np.sum(PERSON.marker_segments == k) <= 7
+]
+
+
 def judged(markers: np.ndarray, times: np.ndarray, filled: np.ndarray | None = None) -> Evidence:
     return marker_evidence(fitted(markers, times), fitted, filled)
 
@@ -47,6 +54,22 @@ def test_a_swap_is_undone(a, b, frames):
     assert found.any_corrected()
     assert event.sentence.endswith("; corrected")
     assert np.array_equal(found.markers_m, clean)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("segment", OF_MANY)
+def test_a_segment_whose_markers_are_in_another_order_is_put_right(segment, seed):
+    """The pose follows labels that are exchanged all together: no pair lies at the other's place."""
+    times, clean, _ = recording(seed, skin_m=0.003)
+    mine = [
+        k for k, s in enumerate(PERSON.marker_segments) if PERSON.skeleton.segments[s] == segment
+    ]
+    other = np.random.default_rng(seed).permutation(mine)
+    markers = clean.copy()
+    markers[:, mine] = clean[:, other]
+    found = judged(markers, times)
+    assert np.array_equal(found.markers_m, clean)
+    assert all(event.put_right for event in found.events if event.kind == "swap")
 
 
 def test_across_a_joint_at_a_low_rate():

@@ -419,13 +419,12 @@ def _lowpassed(trial: _Trial, signals: np.ndarray, ok: np.ndarray) -> np.ndarray
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
     """``joint-peaks`` of ``joint-moments``: a row per method, joint and axis, how large, how sure,
     and what the method changes; ``left_out`` in words, by joint."""
+    starts = np.flatnonzero(moments["time_s"] == moments["time_s"].iloc[0])
     names = ["method", "joint", "axis"]
-    number = moments.groupby(names, sort=False, observed=True).ngroup().to_numpy()
-    order = np.argsort(number, kind="stable").reshape(number.max() + 1, -1)
+    keys = list(moments[names].iloc[starts].astype(str).itertuples(index=False, name=None))
     time_s, moment, sd = (
-        moments[c].to_numpy()[order] for c in ("time_s", "moment_Nm", "moment_sd_Nm")
+        moments[c].to_numpy().reshape(len(keys), -1) for c in ("time_s", "moment_Nm", "moment_sd_Nm")
     )
-    keys = list(moments.loc[order[:, 0], names].astype(str).itertuples(index=False, name=None))
     known = np.isfinite(moment)
     at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]
     time_s, peak, sd = (

@@ -96,13 +96,13 @@ class Spread:
 
     covariances : k of (P, P), of the inertial parameters of each body; None: known.
     centre_m : of a joint's centre in each direction; a moment changes by what the joint's force
-        does along that lever. axes_rad : of the axes' direction about each axis of space: a turned
-        axis shows a part of the moment and the force across it.
+        does along that lever. turns_rad2 : (n, 3, 3) covariances of the turn of each segment's
+        frame in its own axes: a turned axis shows a part of the moment and the force across it.
     """
 
     covariances: tuple[np.ndarray | None, ...]
     centre_m: float
-    axes_rad: float = 0.0
+    turns_rad2: np.ndarray | None = None
 
 
 def joint_loads(
@@ -161,12 +161,36 @@ def joint_loads(
                     at_all = _between(some, of_each, len(rows))
                     variance[:, now, j, :, m] += _halves(at_all[..., None])[..., 0]
             force, moment = wrench[:, :3], wrench[:, 3:] - skew(centre) @ wrench[:, :3]
-            whole = (np.stack([force, moment]) ** 2).sum(axis=2, keepdims=True)
-            across = np.maximum(whole - found**2, 0.0)
-            variance[1, now, j] += spread.centre_m**2 * across[0]
-            variance[:, now, j] += spread.axes_rad**2 * across
+            across = (force**2).sum(axis=1, keepdims=True) - found[0] ** 2
+            variance[1, now, j] += spread.centre_m**2 * np.maximum(across, 0.0)
+            if spread.turns_rad2 is not None:
+                ends = [skeleton.parents[j + 1], j + 1]
+                frames, turns = motion.rotation[:, ends], spread.turns_rad2[ends]
+                variance[:, now, j] += _of_turns(axes, frames, turns, np.stack([force, moment]))
     sd = np.sqrt(variance)
     return JointLoads(joints, value[0], value[1], rates, sd[0], sd[1])
+
+
+def _of_turns(
+    axes: np.ndarray, frames: np.ndarray, turns_rad2: np.ndarray, world: np.ndarray
+) -> np.ndarray:
+    """Variance (2, n, 3, k) of what axes (n, 3, 3) show of vectors (2, n, 3, k) where the frames
+    (n, 2, 3, 3) of the proximal segment, which carries the first axis, and of the distal one, which
+    carries the third, are turned with covariances (2, 3, 3)."""
+    roots = np.linalg.cholesky(turns_rad2).swapaxes(1, 2) @ frames.swapaxes(2, 3)
+    first, second, third = axes.swapaxes(0, 1)
+    cosine = np.einsum("nc,nc->n", first, third)[:, None]
+    # A vector is a first + b second + c third. The second axis stays perpendicular to both others:
+    # it leans against each turn by as much as that tilts the other two towards it.
+    ends = (first, third)
+    shown = [np.einsum("nc,hnck->hnk", e, world) for e in ends]
+    variance = np.zeros_like(world)
+    for end, (axis, root) in enumerate(zip(ends, roots.swapaxes(0, 1), strict=True)):
+        variance[:, :, 2 * end] = ((root @ skew(axis) @ world) ** 2).sum(axis=2)
+        along = (shown[end] - cosine * shown[1 - end]) / (1.0 - cosine**2)
+        lean = np.einsum("nij,nj->ni", root, np.cross(axis, second))
+        variance[:, :, 1] += along**2 * (lean**2).sum(axis=1)[:, None]
+    return variance
 
 
 def _halves(wrench: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ power. `AXES` says what a positive one does to the distal segment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,10 +132,18 @@ def joint_loads(
     rates = np.empty((len(q), len(joints), 3))
     beyond = [skeleton.beyond(i) for i in range(1, len(joints) + 1)]
     carries = np.array([np.isin(skeleton.bodies, list(segments)) for segments in beyond])
+    ends = (list(skeleton.parents[1:]), list(range(1, len(joints) + 1)))
+    levers = []  # (J, 2, 3): how its own segment's turns move the first axis, Z, and the third, Y
+    for end, axis in zip(ends, (2, 1), strict=True):
+        if spread.turns_rad2 is not None:
+            across = np.delete(np.eye(3), axis, axis=0)
+            moved = across @ skew(np.eye(3)[axis])
+            covariance = moved @ spread.turns_rad2[end] @ moved.T
+            levers.append(np.linalg.cholesky(covariance).swapaxes(1, 2) @ across)
     for start in range(0, len(q), block):
         now = slice(start, start + block)
         motion = segment_motion(model, q[now], v[now], a[now])
-        rows = np.stack([motion.wrenches(i) for i in skeleton.bodies], axis=1)
+        rows = motion.wrenches(skeleton.bodies)
         needs = rows @ phi.reshape(1, -1, 10, k)
         wrench = (carries @ needs.reshape(*needs.shape[:2], -1)).reshape(len(rows), -1, 6, k)
         axes, rates[now] = _axes(skeleton, motion)
@@ -160,39 +168,37 @@ def joint_loads(
                     variance[now, j, :, m] += _between(some, of_each, len(rows))
         force = wrench[:, :, :3]
         moment = wrench[:, :, 3:] - skew(centres) @ force
-        across = (force**2).sum(axis=2, keepdims=True) - value[now, :, :3] ** 2
+        squares = np.einsum("njck,njck->njk", force, force)[:, :, None]
+        across = squares - value[now, :, :3] ** 2
         variance[now, :, 3:] += spread.centre_m**2 * np.maximum(across, 0.0)
-        if spread.turns_rad2 is not None:
-            ends = np.stack([skeleton.parents[1:], range(1, len(joints) + 1)], axis=1)
-            frames, turns = motion.rotation[:, ends], spread.turns_rad2[ends]
-            shown = _of_turns(axes, frames, turns, np.concatenate([force, moment], axis=3))
+        if levers:
+            frames = (motion.rotation[:, end].swapaxes(2, 3) for end in ends)
+            turned = [lever @ frame for lever, frame in zip(levers, frames, strict=True)]
+            shown = _of_turns(axes, turned, np.concatenate([force, moment], axis=3))
             variance[now] += np.concatenate([shown[..., :k], shown[..., k:]], axis=2)
     sd = np.sqrt(variance)
     return JointLoads(joints, value[:, :, :3], value[:, :, 3:], rates, sd[:, :, :3], sd[:, :, 3:])
 
 
 def _of_turns(
-    axes: np.ndarray, frames: np.ndarray, turns_rad2: np.ndarray, vectors: np.ndarray
+    axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarray
 ) -> np.ndarray:
     """Variance (n, J, 3, c) of what the axes (n, J, 3, 3) show of vectors (n, J, 3, c), world.
 
-    frames : (n, J, 2, 3, 3) of the proximal segment, which carries the first axis, and of the
-        distal one, which carries the third; turned with covariances ``turns_rad2`` (J, 2, 3, 3).
+    turned : of the first and of the third axis, (n, J, 2, 3) how far turns of one standard
+        deviation of the segment that carries it move the axis in two directions across it.
     """
-    roots = np.linalg.cholesky(turns_rad2).swapaxes(2, 3) @ frames.swapaxes(3, 4)
     first, second, third = np.moveaxis(axes, 2, 0)
-    cosine = (first * third).sum(axis=-1, keepdims=True)
-    variance = []
-    for number, (axis, other) in enumerate(((first, third), (third, first))):
-        turned = roots[:, :, number] @ skew(axis)
+    cosine = np.einsum("njc,njc->nj", first, third)[..., None]
+    changes = []
+    for (axis, other), turn in zip(((first, third), (third, first)), turned, strict=True):
         # The second axis stays perpendicular to both others: where one leans towards it, it leans
         # back, and shows that part of the vector that is along that one and not along the other.
-        lean = np.linalg.norm(turned @ second[..., None], axis=2)
+        lean = np.hypot(*np.moveaxis((turn @ second[..., None])[..., 0], 2, 0))[..., None]
         along = lean * (axis - cosine * other) / (1.0 - cosine**2)
-        variance.append((np.concatenate([turned, along[:, :, None]], axis=2) @ vectors) ** 2)
-    of_first, of_third = variance
-    of_second = of_first[:, :, 3] + of_third[:, :, 3]
-    return np.stack([of_first[:, :, :3].sum(axis=2), of_second, of_third[:, :, :3].sum(axis=2)], 2)
+        changes.append((np.concatenate([turn, along[:, :, None]], axis=2) @ vectors) ** 2)
+    (one, two, of_first), (three, four, of_third) = (np.moveaxis(x, 2, 0) for x in changes)
+    return np.stack([one + two, of_first + of_third, three + four], axis=2)
 
 
 def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:

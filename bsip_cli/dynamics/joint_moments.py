@@ -180,9 +180,7 @@ def joint_loads(
     return JointLoads(joints, value[:, :, :3], value[:, :, 3:], rates, sd[:, :, :3], sd[:, :, 3:])
 
 
-def _of_turns(
-    axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarray
-) -> np.ndarray:
+def _of_turns(axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarray) -> np.ndarray:
     """Variance (n, J, 3, c) of what the axes (n, J, 3, 3) show of vectors (n, J, 3, c), world.
 
     turned : of the first and of the third axis, (n, J, 2, 3) how far turns of one standard

@@ -244,7 +244,8 @@ def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np
     model, count = pinocchio_model(person), len(q)
     each = np.tile(np.eye(model.nv), (count, 1))
     motion = segment_motion(model, np.repeat(q, model.nv, axis=0), np.zeros_like(each), each)
-    information = np.tile(np.diag(np.repeat([0.0, prior_rad**-2], [6, model.nv - 6])), (count, 1, 1))
+    prior = [0.0] * 6 + [prior_rad**-2] * (model.nv - 6)
+    information = np.tile(np.diag(prior), (count, 1, 1))
     places = zip(person.marker_segments, person.markers_in_joint_m(), strict=True)
     for (segment, place), weight in zip(places, person.marker_weights, strict=True):
         # at rest, a point's acceleration is what one unit of each coordinate's moves it

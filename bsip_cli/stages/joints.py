@@ -249,8 +249,8 @@ def turns_of_frames(person: Person, landmark_sd_m: float, largest_rad: float) ->
     """(n, 3, 3) covariance of the turn of each segment's frame in its own axes [rad2].
 
     A frame lies as the segment's markers and the joint centres at its ends do, and each of these
-    may be off by ``landmark_sd_m`` in each direction: so a thigh is known best about the axes across
-    it, a foot worst about the line from heel to toe. ``largest_rad``: where they lie on one line.
+    may be off by ``landmark_sd_m`` in each direction: so a thigh is known worst about its length, a
+    foot about the line from heel to toe. ``largest_rad``: where they lie on one line.
     """
     parents, joints_m = np.array(person.skeleton.parents), person.joint_positions_m()
     turns = []
@@ -442,7 +442,8 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
     names = ["method", "joint", "axis"]
     keys = list(moments[names].iloc[starts].astype(str).itertuples(index=False, name=None))
     time_s, moment, sd = (
-        moments[c].to_numpy().reshape(len(keys), -1) for c in ("time_s", "moment_Nm", "moment_sd_Nm")
+        moments[c].to_numpy().reshape(len(keys), -1)
+        for c in ("time_s", "moment_Nm", "moment_sd_Nm")
     )
     known = np.isfinite(moment)
     at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]

@@ -60,12 +60,13 @@ def main() -> None:
 
 
 def _options(written: dict) -> StudyOptions:
-    """The sample's, with what a command line can change of it."""
+    """The sample's, with what the command line or a caller of `simulate_study` can change of it."""
     base = PRESETS["sample"]
     laboratory = replace(base.laboratory, plate_per_foot=written["laboratory"]["plate_per_foot"])
     return replace(
         base,
         laboratory=laboratory,
+        richness=replace(base.richness, **written["richness"]),
         durations_s=written["durations_s"],
         **{key: written[key] for key in ("participants", "seed", "sexes", "run")},
         tasks=tuple(written["tasks"]),

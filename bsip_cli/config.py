@@ -133,8 +133,7 @@ class Reconstruct(Section):
 
 class Joints(Section):
     cutoff_hz: float = Field(gt=0)
-    centre_sd_m: float = Field(ge=0)
-    axes_sd_deg: float = Field(ge=0)
+    centre_sd_m: float = Field(gt=0)
 
 
 class Diagnosis(Section):

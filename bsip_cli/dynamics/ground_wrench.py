@@ -120,10 +120,10 @@ def rotations_of(quaternions: np.ndarray) -> np.ndarray:
 
 
 def skew(vectors: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) matrices of the cross product with (N, 3) vectors."""
-    x, y, z = vectors.T
+    """(..., 3, 3) matrices of the cross product with (..., 3) vectors."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
-    return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), -1, 0)
+    return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))
 
 
 # --- how the ground wrench answers to small errors of the motion ----------------------------------

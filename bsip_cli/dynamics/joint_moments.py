@@ -17,7 +17,7 @@ power. `AXES` says what a positive one does to the distal segment.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,13 +96,13 @@ class Spread:
 
     covariances : k of (P, P), of the inertial parameters of each body; None: known.
     centre_m : of a joint's centre in each direction; a moment changes by what the joint's force
-        does along that lever. axes_rad : of the axes' direction about each axis of space: a turned
-        axis shows a part of the moment and the force across it.
+        does along that lever. turns_rad2 : (n, 3, 3) covariances of the turn of each segment's
+        frame in its own axes: a turned axis shows a part of the moment and the force across it.
     """
 
     covariances: tuple[np.ndarray | None, ...]
     centre_m: float
-    axes_rad: float = 0.0
+    turns_rad2: np.ndarray | None = None
 
 
 def joint_loads(
@@ -128,50 +128,75 @@ def joint_loads(
     """
     skeleton, model = person.skeleton, pinocchio_model(person)
     joints, k = skeleton.joints[1:], phi.shape[1]
-    shape = (len(q), len(joints), 3)
-    value, variance = np.zeros((2, 2, *shape, k))
-    rates = np.empty(shape)
+    value, variance = np.zeros((2, len(q), len(joints), 6, k))  # forces, then moments
+    rates = np.empty((len(q), len(joints), 3))
     beyond = [skeleton.beyond(i) for i in range(1, len(joints) + 1)]
+    carries = np.array([np.isin(skeleton.bodies, list(segments)) for segments in beyond])
+    ends = (list(skeleton.parents[1:]), list(range(1, len(joints) + 1)))
+    levers = []  # (J, 2, 3): how its own segment's turns move the first axis, Z, and the third, Y
+    for end, axis in zip(ends, (2, 1), strict=True):
+        if spread.turns_rad2 is not None:
+            across = np.delete(np.eye(3), axis, axis=0)
+            moved = across @ skew(np.eye(3)[axis])
+            covariance = moved @ spread.turns_rad2[end] @ moved.T
+            levers.append(np.linalg.cholesky(covariance).swapaxes(1, 2) @ across)
     for start in range(0, len(q), block):
         now = slice(start, start + block)
         motion = segment_motion(model, q[now], v[now], a[now])
-        rows = np.stack([motion.wrenches(i) for i in skeleton.bodies], axis=1)
-        some = np.unique(np.append(np.arange(0, len(rows), every), len(rows) - 1))
+        rows = motion.wrenches(skeleton.bodies)
         needs = rows @ phi.reshape(1, -1, 10, k)
-        for j, segments in enumerate(beyond):
-            axes, rates[now, j] = _axes(skeleton, motion, j + 1)
-            centre = motion.position_m[:, j + 1]
-            onto = _projection(axes, centre)
-            bodies = [b for b, i in enumerate(skeleton.bodies) if i in segments]
-            touching = [ground[s] for n in segments if (s := skeleton.segments[n]) in ground]
-            wrench = needs[:, bodies].sum(axis=1)
-            for one in touching:
-                wrench -= one.wrench[now, :, None]
-                about = np.eye(6)
-                about[3:, :3] = skew(one.noise_at_m[None])[0]
-                squared = (onto @ about) ** 2 @ (one.noise[now, :, None] ** 2)
-                variance[:, now, j] += _halves(squared)
-            value[:, now, j] = found = _halves(onto @ wrench)
-            own = onto[some] @ rows[some][:, bodies].swapaxes(1, 2).reshape(len(some), 6, -1)
-            columns = (10 * np.array(bodies)[:, None] + np.arange(10)).ravel()
+        wrench = (carries @ needs.reshape(*needs.shape[:2], -1)).reshape(len(rows), -1, 6, k)
+        axes, rates[now] = _axes(skeleton, motion)
+        centres = motion.position_m[:, 1:]
+        onto = _projection(axes, centres)
+        for segment, one in ground.items():
+            on = [j for j, segments in enumerate(beyond) if skeleton.index(segment) in segments]
+            wrench[:, on] -= one.wrench[now, None, :, None]
+            about = np.eye(6)
+            about[3:, :3] = skew(one.noise_at_m[None])[0]
+            variance[now, on] += (onto[:, on] @ about) ** 2 @ one.noise[now, None, :, None] ** 2
+        value[now] = onto @ wrench
+        some = np.unique(np.append(np.arange(0, len(rows), every), len(rows) - 1))
+        fewer = rows[some].swapaxes(1, 2)
+        for j, bodies in enumerate(carries):
+            own = onto[some, j] @ fewer[:, :, bodies].reshape(len(some), 6, -1)
+            columns = np.repeat(bodies, 10)
             for m, covariance in enumerate(spread.covariances):
                 if covariance is not None:
                     part = covariance[np.ix_(columns, columns)]
                     of_each = np.einsum("nij,nij->ni", own @ part, own)
-                    at_all = _between(some, of_each, len(rows))
-                    variance[:, now, j, :, m] += _halves(at_all[..., None])[..., 0]
-            force, moment = wrench[:, :3], wrench[:, 3:] - skew(centre) @ wrench[:, :3]
-            whole = (np.stack([force, moment]) ** 2).sum(axis=2, keepdims=True)
-            across = np.maximum(whole - found**2, 0.0)
-            variance[1, now, j] += spread.centre_m**2 * across[0]
-            variance[:, now, j] += spread.axes_rad**2 * across
+                    variance[now, j, :, m] += _between(some, of_each, len(rows))
+        force = wrench[:, :, :3]
+        moment = wrench[:, :, 3:] - skew(centres) @ force
+        squares = np.einsum("njck,njck->njk", force, force)[:, :, None]
+        across = squares - value[now, :, :3] ** 2
+        variance[now, :, 3:] += spread.centre_m**2 * np.maximum(across, 0.0)
+        if levers:
+            frames = (motion.rotation[:, end].swapaxes(2, 3) for end in ends)
+            turned = [lever @ frame for lever, frame in zip(levers, frames, strict=True)]
+            shown = _of_turns(axes, turned, np.concatenate([force, moment], axis=3))
+            variance[now] += np.concatenate([shown[..., :k], shown[..., k:]], axis=2)
     sd = np.sqrt(variance)
-    return JointLoads(joints, value[0], value[1], rates, sd[0], sd[1])
+    return JointLoads(joints, value[:, :, :3], value[:, :, 3:], rates, sd[:, :, :3], sd[:, :, 3:])
 
 
-def _halves(wrench: np.ndarray) -> np.ndarray:
-    """(2, n, 3, k) of (n, 6, k): forces, then moments."""
-    return np.stack([wrench[:, :3], wrench[:, 3:]])
+def _of_turns(axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarray) -> np.ndarray:
+    """Variance (n, J, 3, c) of what the axes (n, J, 3, 3) show of vectors (n, J, 3, c), world.
+
+    turned : of the first and of the third axis, (n, J, 2, 3) how far turns of one standard
+        deviation of the segment that carries it move the axis in two directions across it.
+    """
+    first, second, third = np.moveaxis(axes, 2, 0)
+    cosine = np.einsum("njc,njc->nj", first, third)[..., None]
+    changes = []
+    for (axis, other), turn in zip(((first, third), (third, first)), turned, strict=True):
+        # The second axis stays perpendicular to both others: where one leans towards it, it leans
+        # back, and shows that part of the vector that is along that one and not along the other.
+        lean = np.hypot(*np.moveaxis((turn @ second[..., None])[..., 0], 2, 0))[..., None]
+        along = lean * (axis - cosine * other) / (1.0 - cosine**2)
+        changes.append((np.concatenate([turn, along[:, :, None]], axis=2) @ vectors) ** 2)
+    (one, two, of_first), (three, four, of_third) = (np.moveaxis(x, 2, 0) for x in changes)
+    return np.stack([one + two, of_first + of_third, three + four], axis=2)
 
 
 def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
@@ -181,33 +206,37 @@ def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     return np.stack([np.interp(np.arange(count), some, x) for x in values.T], axis=1)
 
 
-def _axes(skeleton: Skeleton, motion: SegmentMotion, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3, 3) rows: unit axes in the world; (n, 3) rates of the angles about them [rad/s].
+def _axes(skeleton: Skeleton, motion: SegmentMotion) -> tuple[np.ndarray, np.ndarray]:
+    """Of all joints, (n, J, 3, 3) rows: unit axes in the world; (n, J, 3) rates of the angles about
+    them [rad/s].
 
     With c the cosine between first and third axis, w . e1 = rate1 + c rate3 and the reverse.
     """
-    parent, side = skeleton.parents[i], skeleton.side(skeleton.segments[i])
-    sign = -1.0 if side == "l" else 1.0
-    first, third = motion.rotation[:, parent, :, 2], sign * motion.rotation[:, i, :, 1]
+    parents = list(skeleton.parents[1:])
+    left = np.array([skeleton.side(segment) == "l" for segment in skeleton.segments[1:]])
+    sign = np.where(left, -1.0, 1.0)[:, None]
+    first, third = motion.rotation[:, parents][..., 2], sign * motion.rotation[:, 1:, :, 1]
     across = np.cross(third, first)  # the sign of a left joint's comes with its third
-    sine = np.linalg.norm(across, axis=1, keepdims=True)
+    sine = np.linalg.norm(across, axis=2, keepdims=True)
     skewed = sine < PARALLEL
     with np.errstate(invalid="ignore", divide="ignore"):
         second = np.where(skewed, np.nan, across / sine)
-        turning = motion.turning_rad_s[:, i] - motion.turning_rad_s[:, parent]
-        along = np.einsum("nc,nc->n", first, third)
-        one, two, three = (np.einsum("nc,nc->n", turning, e) for e in (first, second, third))
-        rates = np.stack([one - along * three, two * sine[:, 0] ** 2, three - along * one], axis=1)
+        turning = motion.turning_rad_s[:, 1:] - motion.turning_rad_s[:, parents]
+        along = (first * third).sum(axis=2)
+        axes = np.stack([first, second, third], axis=2)
+        one, two, three = np.moveaxis((axes @ turning[..., None])[..., 0], 2, 0)
+        rates = np.stack([one - along * three, two * sine[..., 0] ** 2, three - along * one], 2)
         rates = np.where(skewed, np.nan, rates / sine**2)
-    return np.stack([first, second, third], axis=1), rates
+    return axes, rates
 
 
-def _projection(axes: np.ndarray, centre_m: np.ndarray) -> np.ndarray:
-    """(n, 6, 6): a world wrench about the origin as forces along the axes (n, 3, 3) and moments
-    about them through the joint's centre (n, 3): e . (m - p x f) = e . m + (p x e) . f."""
-    onto = np.zeros((len(axes), 6, 6))
-    onto[:, :3, :3] = onto[:, 3:, 3:] = axes
-    onto[:, 3:, :3] = np.cross(centre_m[:, None], axes)
+def _projection(axes: np.ndarray, centres_m: np.ndarray) -> np.ndarray:
+    """(n, J, 6, 6): a world wrench about the origin as forces along the axes (n, J, 3, 3) and
+    moments about them through the joint's centre (n, J, 3): e . (m - p x f) = e . m + (p x e) . f.
+    """
+    onto = np.zeros((*axes.shape[:2], 6, 6))
+    onto[..., :3, :3] = onto[..., 3:, 3:] = axes
+    onto[..., 3:, :3] = np.cross(centres_m[:, :, None], axes)
     return onto
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,34 +52,35 @@ class SegmentMotion:
         )
         return Point(self.position_m[:, segment] + arm, acceleration)
 
-    def wrenches(self, segment: int) -> np.ndarray:
-        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter.
+    def wrenches(self, segments: int | Sequence[int]) -> np.ndarray:
+        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter of a
+        segment, or (N, s, 6, 10) of several.
 
         Newton and Euler for a body about its joint centre; parameters as in ``body.inertia``.
         """
-        R, w = self.rotation[:, segment], self.turning_rad_s[:, segment]
-        dw = self.turning_acceleration_rad_s2[:, segment]
-        fall = self.acceleration_m_s2[:, segment] + GRAVITY_M_S2 * UP
-        rows = np.zeros((len(R), 6, 10))
-        force, moment = rows[:, :3], rows[:, 3:]
-        force[:, :, 0] = fall
+        R, w = self.rotation[:, segments], self.turning_rad_s[:, segments]
+        dw = self.turning_acceleration_rad_s2[:, segments]
+        fall = self.acceleration_m_s2[:, segments] + GRAVITY_M_S2 * UP
+        rows = np.zeros((*w.shape[:-1], 6, 10))
+        force, moment = rows[..., :3, :], rows[..., 3:, :]
+        force[..., 0] = fall
         spin = skew(w)
-        force[:, :, 1:4] = (skew(dw) + spin @ spin) @ R
-        moment[:, :, 1:4] = -skew(fall) @ R
-        own = R.swapaxes(1, 2)
-        moment[:, :, 4:] = R @ _of_tensor(own, dw) + spin @ R @ _of_tensor(own, w)
-        moment += skew(self.position_m[:, segment]) @ force
+        force[..., 1:4] = (skew(dw) + spin @ spin) @ R
+        moment[..., 1:4] = -skew(fall) @ R
+        own = R.swapaxes(-1, -2)
+        moment[..., 4:] = R @ _of_tensor(own, dw) + spin @ R @ _of_tensor(own, w)
+        moment += skew(self.position_m[:, segments]) @ force
         return rows
 
 
 def _of_tensor(own: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """(N, 3, 6) derivative of tensor @ vector by the tensor's entries, in the axes ``own``
-    (N, 3, 3) of world vectors (N, 3)."""
+    """(..., 3, 6) derivative of tensor @ vector by the tensor's entries, in the axes ``own``
+    (..., 3, 3) of world vectors (..., 3)."""
     local = (own @ vectors[..., None])[..., 0]
-    found = np.zeros((len(local), 3, 6))
+    found = np.zeros((*local.shape, 6))
     for k, (i, j) in enumerate(SYMMETRIC):
-        found[:, i, k] = local[:, j]
-        found[:, j, k] = local[:, i]
+        found[..., i, k] = local[..., j]
+        found[..., j, k] = local[..., i]
     return found
 
 

@@ -58,7 +58,7 @@ def run(unit: Unit) -> None:
     person = person_of(unit)
     trial, bsip = trial_of(unit, person), unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
-    spread = _spreads(unit, methods)
+    spread = _spreads(unit, person, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
     left_out = _report(unit, trial, reasons)
@@ -234,14 +234,33 @@ def _legs(joints: list[str]) -> list[str]:
 # --- how sure ---------------------------------------------------------------------------------
 
 
-def _spreads(unit: Unit, methods: Sequence[str]) -> Spread:
-    """Covariances of the parameters by method, and the joint centres' error."""
+def _spreads(unit: Unit, person: Person, methods: Sequence[str]) -> Spread:
+    """Covariances of the parameters by method, the joint centres' error, and the frames'."""
     rows = unit.read("covariance", method=methods)
     names = [c for c in map(str, rows) if c.startswith("root_")]
     roots = {m: part[names].to_numpy() for m, part in rows.groupby("method")}
     covariances = tuple(roots[m] @ roots[m].T for m in methods)
-    options = unit.config.joints
-    return Spread(covariances, options.centre_sd_m, np.deg2rad(options.axes_sd_deg))
+    sd_m = unit.config.joints.centre_sd_m
+    turns = turns_of_frames(person, sd_m, unit.config.ik.undetermined_sd_rad)
+    return Spread(covariances, sd_m, turns)
+
+
+def turns_of_frames(person: Person, landmark_sd_m: float, largest_rad: float) -> np.ndarray:
+    """(n, 3, 3) covariance of the turn of each segment's frame in its own axes [rad2].
+
+    A frame lies as the segment's markers and the joint centres at its ends do, and each of these
+    may be off by ``landmark_sd_m`` in each direction: so a thigh is known worst about its length, a
+    foot about the line from heel to toe. ``largest_rad``: where they lie on one line.
+    """
+    parents, joints_m = np.array(person.skeleton.parents), person.joint_positions_m()
+    turns = []
+    for i in range(len(parents)):
+        own = person.markers_in_joint_m()[person.marker_segments == i]
+        places = np.vstack([np.zeros(3), own, joints_m[parents == i]])
+        places -= places.mean(axis=0)
+        information = (places**2).sum() * np.eye(3) - places.T @ places
+        turns.append(np.linalg.inv(information / landmark_sd_m**2 + np.eye(3) / largest_rad**2))
+    return np.array(turns)
 
 
 def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -419,13 +438,13 @@ def _lowpassed(trial: _Trial, signals: np.ndarray, ok: np.ndarray) -> np.ndarray
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
     """``joint-peaks`` of ``joint-moments``: a row per method, joint and axis, how large, how sure,
     and what the method changes; ``left_out`` in words, by joint."""
+    starts = np.flatnonzero(moments["time_s"] == moments["time_s"].iloc[0])
     names = ["method", "joint", "axis"]
-    number = moments.groupby(names, sort=False, observed=True).ngroup().to_numpy()
-    order = np.argsort(number, kind="stable").reshape(number.max() + 1, -1)
+    keys = list(moments[names].iloc[starts].astype(str).itertuples(index=False, name=None))
     time_s, moment, sd = (
-        moments[c].to_numpy()[order] for c in ("time_s", "moment_Nm", "moment_sd_Nm")
+        moments[c].to_numpy().reshape(len(keys), -1)
+        for c in ("time_s", "moment_Nm", "moment_sd_Nm")
     )
-    keys = list(moments.loc[order[:, 0], names].astype(str).itertuples(index=False, name=None))
     known = np.isfinite(moment)
     at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]
     time_s, peak, sd = (

@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.dynamics.joint_moments import Ground, Spread, axes_of, joint_loads, of_accelerations
@@ -250,18 +251,23 @@ def test_a_centre_that_is_off_is_a_lever_of_the_joints_force():
     assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(expected)
 
 
-def test_axes_that_are_turned_show_what_lies_across():
-    """Drawn turns of all axes together, of a moment known in the world."""
+def test_frames_that_are_turned_show_what_lies_across():
+    """Drawn turns of pelvis and thigh in their own axes, of a moment known in the world."""
     person, q = standing().person, standing().q
     wrench = np.array([30.0, 40.0, 700.0, 50.0, 60.0, 70.0])
-    found = at_rest(person, q, NO_MASS, pushed(wrench), Spread((None,), 0.0, 0.02))
+    rng = np.random.default_rng(1)
+    roots = rng.normal(0, 0.01, (len(person.skeleton.segments), 3, 3))
+    turns = roots @ roots.swapaxes(1, 2)
+    found = at_rest(person, q, NO_MASS, pushed(wrench), Spread((None,), 0.0, turns))
     j = found.joints.index("hip_r")
     (R,), (p,) = joint_frames(person, q[None])
     moment = -(wrench[3:] - np.cross(p[j + 1], wrench[:3]))
-    first = R[0] @ [0, 0, 1]
-    rng = np.random.default_rng(1)
-    shown = [moment @ (first + np.cross(rng.normal(0, 0.02, 3), first)) for _ in range(4000)]
-    assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(np.std(shown), rel=0.05)
+    pelvis, thigh = (
+        R[i] @ Rotation.from_rotvec(rng.normal(size=(20000, 3)) @ roots[i].T).as_matrix()
+        for i in (0, j + 1)
+    )
+    shown = [(e @ moment).std() for e in joint_axes(pelvis, thigh, 1.0).swapaxes(0, 1)]
+    np.testing.assert_allclose(found.moment_sd_Nm[0, j, :, 0], shown, rtol=0.03)
 
 
 def test_accelerations_spread_as_drawn_ones_do():

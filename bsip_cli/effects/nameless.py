@@ -18,7 +18,7 @@ from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.ground_wrench import move_moments
-from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
 from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
@@ -94,10 +94,10 @@ class Tone(Nameless):
         phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
         return in_channel(scene, target, values[0] * np.cos(phase) + values[1] * np.sin(phase))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
         swing = f"a swing of {OF_THE_LAB[target]} by {size}, {values[2]:.2f} times per second"
-        return f"of unknown cause: {swing}"
+        return Words(f"of unknown cause: {swing}")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         amplitude = float(np.hypot(values[0], values[1]))
@@ -172,7 +172,7 @@ class Course(Nameless):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return np.asarray(self.tangent(scene, target, values) @ values)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         which, quantity = target.split(" by ")
         what = ("the force", "the moment") if which == _ALL else (OF_THE_LAB[which],)
         sizes = self.reported(scene, target, values)
@@ -180,7 +180,7 @@ class Course(Nameless):
             f"{x} by {size:.1f} {unit}" for x, (_, unit, size) in zip(what, sizes, strict=True)
         )
         along = f"(RMS) that goes along with {ALONG[quantity]}"
-        return f"of unknown cause: an error of {' and '.join(errors)} {along}"
+        return Words(f"of unknown cause: an error of {' and '.join(errors)} {along}")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         change = self.change(scene, target, values)[scene.valid]

@@ -79,7 +79,7 @@ def test_a_typical_size_is_possible_visible_and_in_words(effect, scene):
         values[1:4] = 0
     assert effect.possible(scene, target, values)
     assert np.abs(effect.change(scene, target, values)).max() > 0.1
-    sentence = effect.sentence(scene, target, values)
+    sentence = effect.words(scene, target, values).what
     assert "_" not in sentence and not sentence.endswith(".") and len(sentence) > 20
     assert effect.remedy and "_" not in effect.remedy
 

@@ -133,7 +133,7 @@ def test_a_zero_is_no_regularity(scene):
 
 
 def test_what_an_error_goes_along_with_is_said(scene):
-    one = Course().sentence(scene, "fz by load", np.array([10.0, 0, 0, 0]))
+    one = Course().words(scene, "fz by load", np.array([10.0, 0, 0, 0])).what
     assert one.endswith("N (RMS) that goes along with the load")
     (name, unit, size), _ = Course().reported(scene, "all by time", np.ones(24))
     assert (name, unit) == ("force", "N") and size > 1

@@ -21,7 +21,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
 from bsip_cli.commands.named_causes import causes_here, why_left
-from bsip_cli.diagnosis.findings import Number
+from bsip_cli.effects.effect import Number
 from bsip_cli.instruments.c3d_file import wired_plates
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording

@@ -171,7 +171,7 @@ def test_the_light_has_four_states(record):
     assert fine.state == "fine"
     assert re.fullmatch(r"None of the \d+ faults that bsip knows was found in 2 .*", fine.text)
     large = found[found["rank"] == 1].assign(
-        effect="unexplained", target="", parameter="error", sentence="large error, cause unknown"
+        effect="unexplained", target="", parameter="error", what="large error, cause unknown"
     )
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
@@ -183,7 +183,7 @@ def test_the_light_has_four_states(record):
     )
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
-    unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
+    unsure = large.assign(effect="inconclusive", parameter="", what="too short")
     assert (light(record, unsure).state, light(record, unsure).text) == (
         "inconclusive",
         "Too short.",

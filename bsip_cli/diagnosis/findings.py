@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from string import ascii_uppercase
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut, plain
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.effects.effect import Effect, Number, Reported, Words
+from bsip_cli.effects.effect import Effect, Judged, Number, Reported, Words
 
 DRAWS = 200
 SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
@@ -24,33 +24,10 @@ _ARM_M = 0.3  # at which a moment counts as much as a force, to find the compone
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A hypothesis and what is made of it.
+class Finding(Judged):
+    """What the diagnosis writes; ``closing`` ends its sentence."""
 
-    trials : their names. closing : what ends its sentence. class_id : of faults that look alike
-    here; empty for one alone.
-    p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
-    white residual on data held out, and its interval. scope : laboratory, person or trial.
-    rms_change : root mean square of what it does to the component that it changes most [N, N m].
-    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
-    this person's recordings alone, None where they say nothing of a shared one.
-    """
-
-    effect: str
-    target: str
-    trials: tuple[str, ...]
-    numbers: tuple[Number, ...]
-    words: Words
-    p_value: float
-    probability: float
     closing: str = ""
-    verdict: Literal["named", "ambiguous", "rejected"] = "named"
-    class_id: str = ""
-    scope: str = "trial"
-    gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
-    rms_change: float = np.nan
-    persons: int = 0
-    own: Number | None = None
 
     @property
     def sentence(self) -> str:

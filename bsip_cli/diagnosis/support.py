@@ -255,11 +255,11 @@ def stated_mass_findings(
             Words(f"{found}: {why}, or the stated mass is wrong", why, found),
             p_value,
             (1 - p_value) / (len(causes) + 1),
-            f"; to distinguish them, {REMEDY}",
             "ambiguous",
             CLASS,
             scope,
             rms_change=abs(weight),
+            closing=f"; to distinguish them, {REMEDY}",
         )
         for effect, target, name, unit, x, sd, why, scope in causes
     )

@@ -228,6 +228,34 @@ class Number:
         return abs(self.value) / max(width, 1e-12) if np.isfinite(width) else 0.0
 
 
+@dataclass(frozen=True)
+class Judged:
+    """An effect at a place with its numbers, and what is made of it.
+
+    trials : their names. p_value : 1 less ``probability`` that it is there, where no test gives
+    another. class_id : of faults that look alike here; empty for one alone. scope : laboratory,
+    person or trial. gain : percent of the squared white residual on data held out, and its
+    interval. rms_change : root mean square of what it does to the component that it changes most
+    [N, N m]. persons : of the laboratory who share it, 0 of this person's own; own : its largest
+    number by this person's recordings alone, None where they say nothing of a shared one.
+    """
+
+    effect: str
+    target: str
+    trials: tuple[str, ...]
+    numbers: tuple[Number, ...]
+    words: Words
+    p_value: float
+    probability: float
+    verdict: str = "named"  # or ambiguous, or rejected
+    class_id: str = ""
+    scope: str = "trial"
+    gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+    rms_change: float = np.nan
+    persons: int = 0
+    own: Number | None = None
+
+
 _SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
 _PLAIN_NUMBERS = ("damping_ratio", "rate_ratio")
 

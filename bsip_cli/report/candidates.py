@@ -14,38 +14,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bsip_cli.effects.effect import Number, Words
+from bsip_cli.effects.effect import Judged, Number, Words
 from bsip_cli.report import effect_words
 from bsip_cli.report.words import capital, number, true_minus
 
 NOTHING = "none"
 UNNAMED = "unexplained"
+_ALIKE = ("effect", "target", "p_value", "probability", "verdict", "class_id", "scope")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A cause that was analysed, with its numbers; ``trials`` are stems of recordings.
-
-    probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
-    or trial. rms_change : what it does to the component that it changes most [N or N m].
-    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
-    this person's recordings alone, where they say something of a shared one.
-    """
-
-    effect: str
-    target: str
-    verdict: str
-    class_id: str
-    probability: float
-    scope: str
-    rms_change: float
-    gain: tuple[float, float, float]
-    words: Words
-    trials: tuple[str, ...]
-    numbers: tuple[Number, ...]
-    persons: int
-    own: Number | None
+class Candidate(Judged):
+    """A cause that was analysed, in words; ``trials`` are stems of recordings."""
 
     @property
     def label(self) -> str:
@@ -133,19 +113,14 @@ def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
     what, short, against, remark = map(true_minus, texts)
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))
     return Candidate(
-        first["effect"],
-        first["target"],
-        first["verdict"],
-        first["class_id"],
-        float(first["probability"]),
-        first["scope"],
-        float(first["rms_change"]),
-        (gain, low, min(high, 100.0)),  # more than everything cannot go
-        Words(what, short, against, remark, bool(first["is_signed"])),
-        tuple(str(first["trials"]).split(", ")),
-        numbers,
-        int(first["persons"]),
-        next(alone, None),
+        **{name: first[name] for name in _ALIKE},
+        rms_change=first["rms_change"],
+        persons=first["persons"],
+        trials=tuple(str(first["trials"]).split(", ")),
+        numbers=numbers,
+        words=Words(what, short, against, remark, bool(first["is_signed"])),
+        gain=(gain, low, min(high, 100.0)),  # more than everything cannot go
+        own=next(alone, None),
     )
 
 

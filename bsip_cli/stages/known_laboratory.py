@@ -67,10 +67,10 @@ class Known:
                     words,
                     1 - float(first["probability"]),
                     float(first["probability"]),
-                    interval_words(numbers) + known + _own_words(own, rows),
                     scope="laboratory",
                     persons=int(first["persons"]),
                     own=own,
+                    closing=interval_words(numbers) + known + _own_words(own, rows),
                 )
 
     def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> Number | None:

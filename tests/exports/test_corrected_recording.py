@@ -130,7 +130,8 @@ def hide(tmp_path, plain):
         nothing = empty_table("marker-events")
         swaps = [
             dict.fromkeys(nothing.columns, 0.0)
-            | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
+            | dict.fromkeys(("sentence", "what", "when"), "")
+            | {"kind": "swap", "marker": PAIR[0], "partner": PAIR[1]}
             | {"start_s": start, "end_s": end - 0.01, "put_right": True}
             for start, end in SWAPS
             if any(one.name == "marker_swap" for one in asked)

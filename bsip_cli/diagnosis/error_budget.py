@@ -15,7 +15,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.error_model import ErrorModel, Part
-from bsip_cli.diagnosis.findings import Finding, Number, interval_words
+from bsip_cli.diagnosis.findings import Finding, interval_words
+from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.plates import OF_THE_LAB
 from bsip_cli.statistics.choice import ErrorGain, block_errors, error_gain, pooled
@@ -368,10 +369,12 @@ def _finding(
         if worst.correlation < yardsticks.correlation
         else ""
     )
-    sentence = (
-        f"large error, cause unknown: {factor * worst.error:.3g} {read} of "
-        f"{_WORDS[worst.component]} (RMS) remain unexplained{follows}; "
-        f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more; "
-        f"{along(trials, worst.component)}{interval_words((number,))}"
+    size = (
+        f"{factor * worst.error:.3g} {read} of {_WORDS[worst.component]} (RMS) remain "
+        f"unexplained{follows}"
     )
-    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.p_value, 1 - worst.p_value)
+    large = f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more"
+    what = f"large error, cause unknown: {size}; {large}; {along(trials, worst.component)}"
+    said = UNEXPLAINED, "", trials, (number,), Words(what, size, large)
+    closing = interval_words((number,))
+    return Finding(*said, worst.p_value, 1 - worst.p_value, closing=closing)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from string import ascii_uppercase
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut, plain
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.effects.effect import Effect, Reported, digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Effect, Judged, Number, Reported, Words
 
 DRAWS = 200
 SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
@@ -24,42 +24,20 @@ _ARM_M = 0.3  # at which a moment counts as much as a force, to find the compone
 
 
 @dataclass(frozen=True)
-class Number:
-    """A parameter as the diagnosis prints it; NaN where no interval was computed."""
+class Finding(Judged):
+    """What the diagnosis writes; ``closing`` ends its sentence."""
 
-    name: str
-    unit: str
-    value: float
-    low: float = np.nan
-    high: float = np.nan
+    closing: str = ""
 
-
-@dataclass(frozen=True)
-class Finding:
-    """A hypothesis and what is made of it.
-
-    trials : their names. class_id : of faults that look alike here; empty for one alone.
-    p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
-    white residual on data held out, and its interval. scope : laboratory, person or trial.
-    rms_change : root mean square of what it does to the component that it changes most [N, N m].
-    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
-    this person's recordings alone, None where they say nothing of a shared one.
-    """
-
-    effect: str
-    target: str
-    trials: tuple[str, ...]
-    numbers: tuple[Number, ...]
-    sentence: str
-    p_value: float
-    probability: float
-    verdict: Literal["named", "ambiguous", "rejected"] = "named"
-    class_id: str = ""
-    scope: str = "trial"
-    gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
-    rms_change: float = np.nan
-    persons: int = 0
-    own: Number | None = None
+    @property
+    def sentence(self) -> str:
+        """All of it, for people."""
+        if self.verdict != "rejected":
+            return f"{self.words.what}{self.closing}"
+        return (
+            f"{'not so' if self.probability < 0.5 else 'not sure'}: {self.words.what} "
+            f"(probability {self.probability:.2g} given what is found)"
+        )
 
 
 def scope_of(effect: Effect) -> str:
@@ -97,29 +75,26 @@ def _members(
             more["gain"] = held.gain(number).interval()
         numbers = _numbers(fit, number, found.scores.inflation, rng)
         one = replace(fit.faults[number], effect=tried.fault.effect)
-        sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
+        closing = interval_words(numbers)
         if class_id:
-            sentence += f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
+            closing += f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
             more |= {"verdict": "ambiguous", "class_id": class_id}
         else:
             probability = verdict.probability
-        yield _finding(fit, one, numbers, sentence, probability, **more)
+        words = one.alike(fit.session)[0].words(fit.session)
+        yield _finding(fit, one, numbers, words, probability, closing=closing, **more)
 
 
 def _rejected(fit: Fitted, one: Hypothesis, probability: float) -> Finding:
     numbers = tuple(Number(*x) for x in one.reported(fit.session))
-    sentence = (
-        f"{'not so' if probability < 0.5 else 'not sure'}: {one.sentence(fit.session)} "
-        f"(probability {probability:.2g} given what is found)"
-    )
-    return _finding(fit, one, numbers, sentence, probability, verdict="rejected")
+    return _finding(fit, one, numbers, one.words(fit.session), probability, verdict="rejected")
 
 
 def _finding(
     fit: Fitted,
     one: Hypothesis,
     numbers: tuple[Number, ...],
-    sentence: str,
+    words: Words,
     probability: float,
     **more: Any,
 ) -> Finding:
@@ -130,7 +105,7 @@ def _finding(
     ]
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
     most = float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
-    said = one.effect.name, one.target, tuple(x.name for x in trials), numbers, sentence
+    said = one.effect.name, one.target, tuple(x.name for x in trials), numbers, words
     more |= {"scope": scope_of(one.effect), "rms_change": most}
     return Finding(*said, 1 - probability, probability, **more)
 
@@ -175,9 +150,5 @@ def interval_words(numbers: tuple[Number, ...]) -> str:
     names = {one.name for one in numbers}
     parts = {f"{name}_{axis}" for name in names for axis in "xyz"}
     sizes = [one for one in numbers if one.name not in _MOMENTS | parts] or numbers
-    first = max(sizes, key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
-    factor, unit = readable_unit(first.name, first.unit)
-    low, high = factor * first.low, factor * first.high
-    digits = digits_of(high - low if high > low else factor * first.value)
-    interval = with_unit(f"{low:.{digits}f} to {high:.{digits}f}", unit)
-    return f" ({first.name.replace('_', ' ')}: 95 % interval {interval})"
+    first = max(sizes, key=Number.certainty)
+    return f" ({first.name.replace('_', ' ')}: 95 % interval {first.interval()})"

@@ -4,7 +4,7 @@ whether it is of one size throughout."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from bsip_cli.diagnosis.error_model import posterior
 from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
-from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
 from bsip_cli.effects.nameless import UNEXPLAINED, Nameless
 from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
@@ -187,9 +187,9 @@ class Uneven(Nameless):
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return self.effect.reported(scene, target, values)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        known = self.effect.sentence(scene, target, values)
-        return f"of unknown cause: {known}, but not evenly"
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        known = self.effect.words(scene, target, values)
+        return replace(known, what=f"of unknown cause: {known.what}, but not evenly", short="")
 
 
 def plain(effect: Effect) -> Effect:

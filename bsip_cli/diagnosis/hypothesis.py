@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.effect import Effect, Parameter, Words
 from bsip_cli.effects.scene import Scene
 
 
@@ -111,9 +111,9 @@ class Hypothesis:
         """Name, unit and value of what the diagnosis prints."""
         return self.effect.reported(self.scene(session), self.target, self.values)
 
-    def sentence(self, session: Trials) -> str:
+    def words(self, session: Trials) -> Words:
         """What a person should read, without interval."""
-        return self.effect.sentence(self.scene(session), self.target, self.values)
+        return self.effect.words(self.scene(session), self.target, self.values)
 
     def alike(self, session: Trials) -> list[Hypothesis]:
         """Those that these recordings cannot distinguish from it, the plainest first."""

@@ -20,7 +20,6 @@ from bsip_cli.diagnosis.findings import (
     DRAWS,
     SCALE_ERROR,
     Finding,
-    Number,
     interval_words,
     numbers_of,
     scope_of,
@@ -28,7 +27,7 @@ from bsip_cli.diagnosis.findings import (
 from bsip_cli.diagnosis.held_out import BLOCK_S, Gain
 from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.effect import Effect, Number, Words
 from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
@@ -79,14 +78,15 @@ class Proof:
             self.effect.reported(scene, self.target, x) for x in (self.values, *self.draws)
         )
         numbers = numbers_of(reported, drawn)
-        found = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
-        sentence = f"{found}; this is {100 * self.share:.0f} % of {whose} squared residual"
+        remark = f"; this is {100 * self.share:.0f} % of {whose} squared residual"
         more: dict[str, Any] = {"scope": scope_of(self.effect)}
         if gain is not None and gain.is_real():
             more["gain"] = gain.interval()
         else:
-            sentence += ", and the forces do not show it"
-        said = self.effect.name, self.target, (trial,), numbers, sentence
+            remark += ", and the forces do not show it"
+        more["closing"] = interval_words(numbers) + remark
+        words = replace(self.effect.words(scene, self.target, self.values), remark=remark)
+        said = self.effect.name, self.target, (trial,), numbers, words
         return Finding(*said, self.p_value, 1 - self.p_value, **more)
 
     def left(self, scene: Scene) -> np.ndarray:
@@ -160,14 +160,14 @@ def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding
     person = scene.person
     on = [int(person.marker_segments[person.markers.index(one.target)]) for one in shaken]
     target = person.skeleton.segments[max(on, key=on.count)]
-    said = (
+    words = Words(
         f"soft tissue moves {len(shaken)} markers ({', '.join(one.target for one in shaken)}) by "
         f"{' to '.join(dict.fromkeys(f'{one:.0f}' for one in (min(sizes), max(sizes))))} mm from "
         f"{min(float(one.values[3]) for one in shaken):.2f} s on"
     )
     p_value = max(one.p_value for one in shaken)
     size = Number("size", "m", max(sizes) / 1000)
-    return Finding(SOFT_TISSUE, target, (trial,), (size,), said, p_value, 1 - p_value)
+    return Finding(SOFT_TISSUE, target, (trial,), (size,), words, p_value, 1 - p_value)
 
 
 def bend_of(
@@ -190,23 +190,21 @@ def bend_of(
     waist = _sized(fewer, left, EFFECTS["joint_centre"], "waist", (), rng)
     if waist.share >= bend.share:
         return ()  # by so much scaling errs
-    alike = f"a second bend and soft tissue look alike here: to distinguish them, {effect.remedy}"
+    alike = f"; a second bend and soft tissue look alike here: to distinguish them, {effect.remedy}"
     found = bend.finding(fewer, trial, None)
     found = replace(
         found,
         verdict="ambiguous",
         class_id=class_id,
-        sentence=f"{found.sentence}; {alike}",
+        closing=found.closing + alike,
         probability=found.probability / 2,  # nothing speaks for the one rather than the other
     )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
-    said = (
-        f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture: its markers "
-        f"are {1000 * size:.0f} mm off; {alike}"
-    )
-    numbers = (Number("size", "m", size),)
-    return found, replace(found, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
+    short = f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture"
+    words = Words(f"{short}: its markers are {1000 * size:.0f} mm off", short)
+    tissue = replace(found, effect=SOFT_TISSUE, words=words, closing=alike, scope="person")
+    return found, replace(tissue, numbers=(Number("size", "m", size),))
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:

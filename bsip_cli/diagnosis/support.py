@@ -17,8 +17,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
+from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.loads import AddedMass, UnmeasuredContact
 from bsip_cli.effects.plates import PlateGain, PlateZero
 from bsip_cli.effects.scene import Scene
@@ -71,7 +72,7 @@ class Support:
                 *(Number(name, "s", at, at, at) for name, at in times),
                 *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
             ),
-            f"{self.words()}, and what else may be wrong in this trial is not asked",
+            Words(f"{self.words()}, and what else may be wrong in this trial is not asked"),
             p_value,
             1 - p_value,
             gain=(percent, low, high),
@@ -251,13 +252,14 @@ def stated_mass_findings(
             target,
             trials,
             (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
-            f"{found}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
+            Words(f"{found}: {why}, or the stated mass is wrong", why, found),
             p_value,
             (1 - p_value) / (len(causes) + 1),
             "ambiguous",
             CLASS,
             scope,
             rms_change=abs(weight),
+            closing=f"; to distinguish them, {REMEDY}",
         )
         for effect, target, name, unit, x, sd, why, scope in causes
     )

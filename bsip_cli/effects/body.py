@@ -11,7 +11,7 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_phi
 from bsip_cli.dynamics.ground_wrench import centre_of_pressure
 from bsip_cli.dynamics.segment_motion import UP
-from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, along_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words
 
@@ -32,9 +32,9 @@ class StatedMass(Effect):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return values[0] * scene.predicted
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         order = "more" if values[0] > 0 else "less"
-        return f"the person weighs {100 * abs(values[0]):.1f} % {order} than is stated"
+        return Words(f"the person weighs {100 * abs(values[0]):.1f} % {order} than is stated")
 
 
 MASS_SHARE, CENTRE_SHARE, INERTIA_SHARE = 0.2, 0.06, 0.3  # how far people are from tables
@@ -87,11 +87,9 @@ class SegmentInertia(Effect):
         cop = _share(seen, was, now, scene.valid)
         return (("share", "1", wrench), ("cop_share", "1", cop))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return (
-            f"the {in_words(target)} has other inertial parameters than simulated with "
-            f"({values[0]:+.2f} kg)"
-        )
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        short = f"the {in_words(target)} has other inertial parameters than simulated with"
+        return Words(f"{short} ({values[0]:+.2f} kg)", short)
 
 
 def _phi(scene: Scene, target: str) -> np.ndarray:
@@ -198,11 +196,11 @@ class WobblingMass(Effect):
         """Without what seems to swing to the sides."""
         return super().reported(scene, target, values)[:3]
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return (
-            f"{values[0]:.1f} kg of soft tissue of the {in_words(target)} swing against the bone, "
-            f"{values[1]:.1f} times per second (damping ratio {values[2]:.2f})"
-        )
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        mass, hertz, damping, *_ = values
+        short = f"{mass:.1f} kg of soft tissue of the {in_words(target)} swing against the bone"
+        what = f"{short}, {hertz:.1f} times per second (damping ratio {damping:.2f})"
+        return Words(what, short)
 
 
 def _swings(
@@ -291,11 +289,9 @@ class Breathing(Effect):
         amplitude = float(np.hypot(values[0], values[1]))
         return ("amplitude", "kg m", amplitude), ("frequency", "Hz", float(values[2]))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return (
-            f"breathing moves the trunk {values[2]:.2f} times per second (mass times amplitude "
-            f"{np.hypot(values[0], values[1]):.3f} kg m)"
-        )
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        short, size = f"breathing moves the trunk {values[2]:.2f} times per second", values[:2]
+        return Words(f"{short} (mass times amplitude {np.hypot(*size):.3f} kg m)", short)
 
 
 def _slowest_hz(scene: Scene) -> float:

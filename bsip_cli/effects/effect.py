@@ -43,6 +43,22 @@ class Parameter:
 Reported = tuple[tuple[str, str, float], ...]  # name, unit and value of what is printed
 
 
+@dataclass(frozen=True)
+class Words:
+    """A cause in words, of which each sentence about it is made.
+
+    what : all of it, without interval. short : in fewest words, empty where these are all.
+    against : by what it is judged, where that is no usual size. remark : what follows the interval.
+    is_signed : whether a negative number has its sign in ``what``, and so in its interval.
+    """
+
+    what: str
+    short: str = ""
+    against: str = ""
+    remark: str = ""
+    is_signed: bool = True
+
+
 class Effect(ABC):
     """A cause outside the inertial parameters that changes wrench or markers.
 
@@ -91,7 +107,7 @@ class Effect(ABC):
         """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
 
     @abstractmethod
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         """What a person should read, without interval."""
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray | None:
@@ -177,6 +193,68 @@ def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:
 
 
 # --- the units and digits in which people read the sizes of effects -------------------------------
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter with its 95 % interval, NaN where there is none."""
+
+    name: str
+    unit: str
+    value: float
+    low: float = np.nan
+    high: float = np.nan
+
+    def interval(self, is_signed: bool = True) -> str:
+        """``1.87 to 2.14°``; without signs as sizes, if zero is not between them."""
+        factor, unit = readable_unit(self.name, self.unit)
+        low, high = factor * self.low, factor * self.high
+        if not np.isfinite(high - low):
+            return ""
+        if not is_signed and low * high > 0:
+            low, high = sorted((abs(low), abs(high)))
+        digits = digits_of(high - low if high > low else factor * self.value)
+        return with_unit(f"{low:z.{digits}f} to {high:z.{digits}f}", unit)
+
+    def size(self) -> str:
+        """``1.99°``, with the digits of its interval."""
+        factor, unit = readable_unit(self.name, self.unit)
+        digits = digits_of(factor * (self.high - self.low))
+        return with_unit(f"{factor * self.value:z.{digits}f}", unit)
+
+    def certainty(self) -> float:
+        """Its size over the width of its interval; 0 where none is known."""
+        width = self.high - self.low
+        return abs(self.value) / max(width, 1e-12) if np.isfinite(width) else 0.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An effect at a place with its numbers, and what is made of it.
+
+    trials : their names. p_value : 1 less ``probability`` that it is there, where no test gives
+    another. class_id : of faults that look alike here; empty for one alone. scope : laboratory,
+    person or trial. gain : percent of the squared white residual on data held out, and its
+    interval. rms_change : root mean square of what it does to the component that it changes most
+    [N, N m]. persons : of the laboratory who share it, 0 of this person's own; own : its largest
+    number by this person's recordings alone, None where they say nothing of a shared one.
+    """
+
+    effect: str
+    target: str
+    trials: tuple[str, ...]
+    numbers: tuple[Number, ...]
+    words: Words
+    p_value: float
+    probability: float
+    verdict: str = "named"  # or ambiguous, or rejected
+    class_id: str = ""
+    scope: str = "trial"
+    gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+    rms_change: float = np.nan
+    persons: int = 0
+    own: Number | None = None
+
 
 _SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
 _PLAIN_NUMBERS = ("damping_ratio", "rate_ratio")

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.segment_motion import UP
-from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
 from bsip_cli.effects.scene import Scene
 
 
@@ -46,8 +46,9 @@ class GravityTilt(Turned):
         force = np.broadcast_to(weight, (len(scene.times_s), 3))
         return np.hstack([force, np.cross(scene.centre_of_mass_m, force)])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"the lab's Z axis is {np.degrees(np.hypot(*values)):.2f} degrees off the vertical"
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        what = f"the lab's Z axis is {np.degrees(np.hypot(*values)):.2f} degrees off the vertical"
+        return Words(what, is_signed=False)
 
 
 class CameraFrame(Turned):
@@ -74,6 +75,7 @@ class CameraFrame(Turned):
         moved = centre @ back - centre
         return np.hstack([force @ back - force, moment @ back - moment + np.cross(moved, weight)])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         degrees = np.degrees(np.hypot(*values))
-        return f"the cameras' axes are turned by {degrees:.2f} degrees against plates and gravity"
+        what = f"the cameras' axes are turned by {degrees:.2f} degrees against plates and gravity"
+        return Words(what, is_signed=False)

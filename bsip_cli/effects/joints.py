@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.segment_motion import UP, Point
-from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, along_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import the_joint
 
@@ -71,11 +71,10 @@ class JointCentre(Effect):
         """No further than palpated or regressed centres lie off."""
         return bool(np.linalg.norm(values) < MOST_M)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return (
-            f"the centre of {the_joint(target)} lies {1000 * np.linalg.norm(values):.0f} mm from "
-            "where the model has it"
-        )
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        size = f"{1000 * np.linalg.norm(values):.0f} mm"
+        what = f"the centre of {the_joint(target)} lies {size} from where the model has it"
+        return Words(what, is_signed=False)
 
     @staticmethod
     def _apart(scene: Scene, i: int) -> np.ndarray:
@@ -180,11 +179,12 @@ class MissingJoint(Effect):
         asked = np.where(self.is_identifiable(scene, target), values, 0.0)
         return super().possible(scene, target, asked)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         shares = dict(zip(AXES, values.tolist(), strict=True))
         large = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
         parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in large.items())
-        return f"the trunk moves at a second joint between waist and neck ({parts})"
+        short = "the trunk moves at a second joint between waist and neck"
+        return Words(f"{short} ({parts})", short)
 
     @staticmethod
     def _errors(scene: Scene, target: str) -> np.ndarray:

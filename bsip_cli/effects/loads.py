@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.dynamics.ground_wrench import skew
-from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz, parts_xyz
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, along_xyz, parts_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words
 
@@ -80,8 +80,10 @@ class AddedMass(Effect):
         within = super().possible(scene, target, values)
         return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        return Words(
+            f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
+        )
 
 
 def carried(scene: Scene, target: str) -> np.ndarray:
@@ -142,8 +144,10 @@ class ReleasedObject(Held):
         first, last = seen_between(scene)
         return super().possible(scene, target, values) and first <= values[1] <= last
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        return Words(
+            f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+        )
 
 
 class ObjectHandled(Held):
@@ -180,9 +184,9 @@ class ObjectHandled(Held):
         seen = first <= start and start + WINDOWS_S[0] <= end <= last
         return seen and super().possible(scene, target, values)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         mass, start, end = values
-        return (
+        return Words(
             f"the {in_words(target)} picks up {mass:.2f} kg at {start:.2f} s and puts it down at "
             f"{end:.2f} s"
         )
@@ -290,14 +294,15 @@ class Implement(Effect):
         parts = parts_xyz("centre", "m", centre_m(values))
         return *sizes, ("inertia", "kg m2", moment * arm), *parts
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         distance = values[1] / values[4]
         both = "+" in target
         holding = "both hands hold" if both else f"the {in_words(target)} holds"
-        return (
+        short = (
             f"{holding} {values[0] / distance:.2f} kg whose centre is {distance:.2f} m from the "
-            f"{'hands' if both else 'hand'}, as of a club or racket"
+            f"{'hands' if both else 'hand'}"
         )
+        return Words(f"{short}, as of a club or racket", short)
 
 
 def centre_m(values: np.ndarray) -> np.ndarray:
@@ -376,11 +381,12 @@ class ExternalForce(Effect):
         """The force, and its parts along the lab's axes."""
         return ("force", "N", float(np.linalg.norm(values))), *parts_xyz("force", "N", values)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return (
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        short = (
             f"something beside the plates pushes on the {in_words(target)} throughout with "
-            f"{np.linalg.norm(values):.0f} N, {values[2]:+.0f} N of it upwards"
+            f"{np.linalg.norm(values):.0f} N"
         )
+        return Words(f"{short}, {values[2]:+.0f} N of it upwards", short)
 
 
 SHORTEST_S = 0.7
@@ -473,9 +479,9 @@ class UnmeasuredContact(Effect):
         seconds = float((touching & scene.valid).sum()) / scene.rate_hz
         return super().possible(scene, target, values) and seconds >= SHORTEST_S
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         start, end = _window(values)
-        return (
+        return Words(
             f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the "
             f"{in_words(target)} with {np.linalg.norm(values[:3]):.0f} N"
         )

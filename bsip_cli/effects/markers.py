@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.special import ndtr
 
-from bsip_cli.effects.effect import Effect, Parameter, Reported, explained_share, parts_xyz
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, explained_share, parts_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_events import two_levels
 from bsip_cli.segments import mirrored
@@ -108,11 +108,11 @@ class MarkerShift(Effect):
         size, since = float(np.linalg.norm(values[:3])), float(max(values[3], scene.times_s[0]))
         return ("shift", "m", size), *parts_xyz("shift", "m", values), ("from_time", "s", since)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         late = values[3] > scene.times_s[0]
         since = f"from {values[3]:.1f} s on" if late else "throughout"
         size = 1000 * np.linalg.norm(values[:3])
-        return f"marker {target} sits {size:.0f} mm from its place {since}"
+        return Words(f"marker {target} sits {size:.0f} mm from its place {since}")
 
     @staticmethod
     def _directions(scene: Scene, m: int) -> np.ndarray:
@@ -191,9 +191,9 @@ class MarkerSlide(MarkerShift):
         way = ("way", "m", float(np.linalg.norm(values[:3])))
         return way, *parts_xyz("way", "m", values), ("start", "s", start), ("end", "s", end)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         size, half = 1000 * np.linalg.norm(values[:3]), values[4] / 2
-        return (
+        return Words(
             f"marker {target} slides {size:.0f} mm along its segment from {values[3] - half:.1f} "
             f"to {values[3] + half:.1f} s"
         )
@@ -271,9 +271,9 @@ class MarkerSwap(Effect):
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return (("start", "s", float(values[1])), ("end", "s", float(values[2])))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         first, second = target.split("+")
-        return (
+        return Words(
             f"markers {first} and {second} bear each other's labels from {values[1]:.2f} to "
             f"{values[2]:.2f} s"
         )
@@ -380,9 +380,9 @@ class OverSmoothing(Effect):
         power."""
         return (("cutoff", "Hz", float(values[1] * max(values[0], 1e-6) ** -0.25)),)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         ((_, unit, cutoff),) = self.reported(scene, target, values)
-        return (
+        return Words(
             f"the markers were low-passed with a cut-off near {cutoff:.1f} {unit} before they were "
             "delivered"
         )

@@ -18,7 +18,7 @@ from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.ground_wrench import move_moments
-from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
 from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
@@ -94,10 +94,10 @@ class Tone(Nameless):
         phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
         return in_channel(scene, target, values[0] * np.cos(phase) + values[1] * np.sin(phase))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
         swing = f"a swing of {OF_THE_LAB[target]} by {size}, {values[2]:.2f} times per second"
-        return f"of unknown cause: {swing}"
+        return Words(f"of unknown cause: {swing}")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         amplitude = float(np.hypot(values[0], values[1]))
@@ -172,12 +172,10 @@ class Course(Nameless):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return np.asarray(self.tangent(scene, target, values) @ values)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         _, quantity = target.split(" by ")
-        errors = _in_words(self.sizes(scene, target, values))
-        return (
-            f"of unknown cause: an error of {errors} (RMS) that goes along with {ALONG[quantity]}"
-        )
+        errors, along = _in_words(self.sizes(scene, target, values)), ALONG[quantity]
+        return Words(f"of unknown cause: an error of {errors} (RMS) that goes along with {along}")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return _of_few(self.sizes(scene, target, values))
@@ -209,9 +207,9 @@ class Mean(Nameless):
         constant[:, [CHANNELS.index(x) for x in self.sizes]] = values
         return move_moments(constant, -place_of_stance_m(scene))
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         errors = _in_words(dict(zip(self.sizes, values.tolist(), strict=True)))
-        return f"of unknown cause: a constant error of {errors}"
+        return Words(f"of unknown cause: a constant error of {errors}")
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return _of_few(dict(zip(self.sizes, values.tolist(), strict=True)))

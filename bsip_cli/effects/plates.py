@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.effects.effect import Effect, Parameter, Reported
+from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
 from bsip_cli.effects.scene import Plate, Scene
 
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -138,9 +138,9 @@ class PlateZero(OwnSignal):
         bounds = (-200.0, 200.0, 10.0) if unit == "N" else (-100.0, 100.0, 5.0)
         return (Parameter("offset", unit, *bounds),)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         reads, unit = self._reads(target)
-        return f"{reads} with a constant offset of {values[0]:+.1f} {unit}"
+        return Words(f"{reads} with a constant offset of {values[0]:+.1f} {unit}")
 
 
 class PlateDrift(OwnSignal):
@@ -162,9 +162,9 @@ class PlateDrift(OwnSignal):
     def signal(self, scene: Scene) -> np.ndarray:
         return scene.times_s - scene.times_s[0]
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         reads, unit = self._reads(target)
-        return f"{reads} with a drift of {values[0]:+.2f} {unit} per second"
+        return Words(f"{reads} with a drift of {values[0]:+.2f} {unit} per second")
 
 
 class PlateGain(OfPlates):
@@ -189,11 +189,12 @@ class PlateGain(OfPlates):
         parts = [in_channel(p, k, share * shown(p, k)) for p in plates_of(scene, name)]
         return np.sum(parts, axis=0)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         name, channel = target.rsplit(" ", 1)
         order = "large" if values[0] > 0 else "small"
         reads = plates_that(name, "reads", "read")
-        return f"{reads} {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"
+        what = f"{reads} {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"
+        return Words(what, is_signed=False)
 
 
 class PlateCrosstalk(OfPlates):
@@ -219,10 +220,12 @@ class PlateCrosstalk(OfPlates):
         leaks = [in_channel(p, sink, shown(p, source)) for p in plates_of(scene, name)]
         return values[0] * np.sum(leaks, axis=0)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         name, pair = target.rsplit(" ", 1)
         source, sink = (OF_A_PLATE[c] for c in pair.split(">"))
-        return f"{100 * values[0]:+.1f} % of {source} of {plates_called(name)} leaks into {sink}"
+        return Words(
+            f"{100 * values[0]:+.1f} % of {source} of {plates_called(name)} leaks into {sink}"
+        )
 
 
 class PlateRotation(OfPlates):
@@ -250,7 +253,7 @@ class PlateRotation(OfPlates):
         dforce, dmoment = force - force @ true, moment - moment @ true
         return np.hstack([dforce, dmoment + np.cross(centre, dforce)])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         x, y, yaw = np.degrees(values)
         turned = f"turned by {yaw:+.1f} degrees about the vertical"
         tilted = f"tilted by {np.hypot(x, y):.1f} degrees"
@@ -258,7 +261,8 @@ class PlateRotation(OfPlates):
         said = (
             [turned] if np.hypot(x, y) < 0.1 else [tilted] if abs(yaw) < 0.1 else [turned, tilted]
         )
-        return f"{plates_that(target, 'is', 'are')} {' and '.join(said)}"
+        what = f"{plates_that(target, 'is', 'are')} {' and '.join(said)}"
+        return Words(what, is_signed=turned in said)
 
 
 class PlateTranslation(OfPlates):
@@ -289,16 +293,15 @@ class PlateTranslation(OfPlates):
         force = np.sum(loads, axis=0)
         return np.hstack([np.zeros_like(force), -np.cross(values, force)])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         """The height if it is more than 20 mm, by which bodies of another table seem to be higher
         or lower, and more than it is sideways; or three times as much."""
         x, y, z = 1000 * values
         sideways = np.hypot(x, y)
         height = f", height {z:+.0f} mm" if abs(z) > min(60.0, max(20.0, sideways)) else ""
-        return (
-            f"{plates_that(target, 'lies', 'lie')} {sideways:.0f} mm sideways from where the "
-            f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})"
-        )
+        lie = plates_that(target, "lies", "lie")
+        short = f"{lie} {sideways:.0f} mm sideways from where the file says"
+        return Words(f"{short} (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})", short)
 
 
 # --- clocks of cameras and plates that do not agree; and what several effects change together -----
@@ -337,9 +340,10 @@ class SyncOffset(Delay):
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return np.full(len(scene.times_s), values[0])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         order = "after" if values[0] > 0 else "before"
-        return f"the forces were recorded {1000 * abs(values[0]):.1f} ms {order} the markers"
+        what = f"the forces were recorded {1000 * abs(values[0]):.1f} ms {order} the markers"
+        return Words(what, is_signed=False)
 
 
 class ClockDrift(Delay):
@@ -356,9 +360,10 @@ class ClockDrift(Delay):
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return values[0] * (scene.times_s - scene.times_s[0])
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         order = "slower" if values[0] > 0 else "faster"
-        return f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"
+        what = f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"
+        return Words(what, is_signed=False)
 
 
 class FrameRate(Effect):
@@ -380,8 +385,8 @@ class FrameRate(Effect):
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return (("rate_ratio", "1", 1 + float(values[0])),)
 
-    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
-        return f"all was recorded at {1 + values[0]:.3g} times the rate that the file states"
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        return Words(f"all was recorded at {1 + values[0]:.3g} times the rate that the file states")
 
 
 def corrected(scene: Scene, late_s: np.ndarray) -> np.ndarray:

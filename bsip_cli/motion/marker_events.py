@@ -259,6 +259,7 @@ class MarkerEvent:
         unlikeliness as the length of a normal vector (other slips), residual as labelled over
         residual exchanged, or the line between the two over what it lacks of an exact reversal
         (swap).
+    what : the sentence but for what was done; when : in words.
     put_right : the labels of a swap were exchanged back before the poses were fitted.
     """
 
@@ -270,6 +271,8 @@ class MarkerEvent:
     size_m: float
     statistic: float
     sentence: str
+    what: str = ""
+    when: str = ""
     put_right: bool = False
 
 
@@ -292,14 +295,16 @@ def event(
     whole = frames.start == 0 and frames.stop == len(fit.times_s)
     when = "throughout the trial" if whole else f"from {start:.2f} to {end:.2f} s"
     mm = f"{1000 * size_m:.0f} mm"
-    sentence = {
+    what = {
         "jump": f"{marker} jumps {mm} away {when} and comes back",
         "slip": f"{marker} slips {mm} on {segment} at {start:.2f} s and stays there",
-        "swap": f"{marker} and {other}, {mm} apart, {_BEAR} {when}; {_DONE[put_right]}",
+        "swap": f"{marker} and {other}, {mm} apart, {_BEAR} {when}",
         "offset": f"{marker} sits {mm} from its calibrated place on {segment} {when}",
     }[kind]
-    sentence += note
-    return MarkerEvent(kind, marker, other, start, end, size_m, statistic, sentence, put_right)
+    what += note
+    sentence = f"{what}; {_DONE[put_right]}" if kind == "swap" else what
+    said = sentence, what, when
+    return MarkerEvent(kind, marker, other, start, end, size_m, statistic, *said, put_right)
 
 
 def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
@@ -326,7 +331,7 @@ def _of_group(group: list[MarkerEvent]) -> str:
         mine, others = (
             ", ".join(getattr(e, name) for e in group) for name in ("marker", "partner")
         )
-        return f"{mine} and {others} {_BEAR}{first.sentence.split(_BEAR)[1]}"
+        return f"{mine} and {others} {_BEAR} {first.when}; {_DONE[first.put_right]}"
     mm = 1000 * max(one.size_m for one in group)
     return (
         f"{first.marker} jumps {len(group)} times, by up to {mm:.0f} mm, "

@@ -4,7 +4,6 @@ might have been and still been seen.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -15,77 +14,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Judged, Number, Words
 from bsip_cli.report import effect_words
 from bsip_cli.report.words import capital, number, true_minus
 
 NOTHING = "none"
 UNNAMED = "unexplained"
-_INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
-_ADVICE = re.compile(r"; ([^;]* look alike here: )?to distinguish them, .*$")
-_REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
-_OF_ALL = "; this is known from the laboratory"  # what follows it too
-_REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
-_SIGNED = re.compile(r"[+−]\d")
+_ALIKE = ("effect", "target", "p_value", "probability", "verdict", "class_id", "scope")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
 
 
-@dataclass(frozen=True)
-class Number:
-    """A parameter with its 95 % interval, NaN where there is none."""
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-
-    def interval(self, signed: bool = True) -> str:
-        """``1.87 to 2.14°``; without signs as sizes, if zero is not between them."""
-        factor, unit = readable_unit(self.name, self.unit)
-        low, high = factor * self.low, factor * self.high
-        if not np.isfinite(high - low):
-            return ""
-        if not signed and low * high > 0:
-            low, high = sorted((abs(low), abs(high)))
-        digits = digits_of(high - low if high > low else factor * self.value)
-        return with_unit(f"{number(low, digits)} to {number(high, digits)}", unit)
-
-    def size(self) -> str:
-        """``1.99°``, with the digits of its interval."""
-        factor, unit = readable_unit(self.name, self.unit)
-        digits = digits_of(factor * (self.high - self.low))
-        return with_unit(number(factor * self.value, digits), unit)
-
-    def certainty(self) -> float:
-        """Its size over the width of its interval; 0 where none is known."""
-        width = self.high - self.low
-        return abs(self.value) / max(width, 1e-12) if np.isfinite(width) else 0.0
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A cause that was analysed, with its numbers; ``trials`` are stems of recordings.
-
-    probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
-    or trial. rms_change : what it does to the component that it changes most [N or N m].
-    persons : of the laboratory who share it, 0 of this person's own; own : its largest number by
-    this person's recordings alone, where they say something of a shared one.
-    """
-
-    effect: str
-    target: str
-    verdict: str
-    class_id: str
-    probability: float
-    scope: str
-    rms_change: float
-    gain: tuple[float, float, float]
-    sentence: str
-    trials: tuple[str, ...]
-    numbers: tuple[Number, ...]
-    persons: int
-    own: Number | None
+class Candidate(Judged):
+    """A cause that was analysed, in words; ``trials`` are stems of recordings."""
 
     @property
     def label(self) -> str:
@@ -106,30 +46,22 @@ class Candidate:
         alone = ""
         if self.own:
             interval = "" if short else f", 95 % interval {self.own.interval()}"
-            alone = f" (this person alone: {self.own.size()}{interval})"
+            alone = true_minus(f" (this person alone: {self.own.size()}{interval})")
         return (
             f"Correct with this size, as {self.persons} persons of the laboratory share it{alone}."
         )
 
-    def what(self) -> str:
-        """Its sentence without interval, advice and reason."""
-        text = self.sentence.partition(_OF_ALL)[0]
-        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", text))
-        text = text.removeprefix("not so: ").removeprefix("not sure: ")
-        text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
-        return true_minus(text)
-
     def in_words(self, remarks: bool = True) -> str:
-        """Its sentence with the interval of its main number, and what the markers alone say."""
-        main, what = self.main_number(), self.what()
-        found = _REMARK.search(self.sentence) if remarks and not self.is_of_all else None
-        remark = found[0] if found else ""
-        interval = main.interval(bool(_SIGNED.search(what))) if main else ""
+        """What it is with the interval of its main number, and what the markers alone say."""
+        main, what = self.main_number(), self.words.what
+        remark = self.words.remark if remarks else ""
+        interval = main.interval(self.words.is_signed) if main else ""
         if main is None or not interval:
             return what + remark
         name = effect_words.parameter_label(self.effect, main.name)
         name = "" if name in what else name
-        return f"{what} ({name}{': ' if name else ''}95 % interval {interval}){remark}"
+        interval = f"{name}{': ' if name else ''}95 % interval {true_minus(interval)}"
+        return f"{what} ({interval}){remark}"
 
     def main_number(self) -> Number | None:
         """The number that the effect is about; of several alike, the one that is known best."""
@@ -177,21 +109,18 @@ def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
         for r in rows
         if isfinite(r["own_estimate"])
     )
+    texts = first["what"], first["short"], first["against"], first["remark"]
+    what, short, against, remark = map(true_minus, texts)
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))
     return Candidate(
-        first["effect"],
-        first["target"],
-        first["verdict"],
-        first["class_id"],
-        float(first["probability"]),
-        first["scope"],
-        float(first["rms_change"]),
-        (gain, low, min(high, 100.0)),  # more than everything cannot go
-        first["sentence"],
-        tuple(str(first["trials"]).split(", ")),
-        numbers,
-        int(first["persons"]),
-        next(alone, None),
+        **{name: first[name] for name in _ALIKE},
+        rms_change=first["rms_change"],
+        persons=first["persons"],
+        trials=tuple(str(first["trials"]).split(", ")),
+        numbers=numbers,
+        words=Words(what, short, against, remark, bool(first["is_signed"])),
+        gain=(gain, low, min(high, 100.0)),  # more than everything cannot go
+        own=next(alone, None),
     )
 
 

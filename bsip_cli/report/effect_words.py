@@ -96,11 +96,11 @@ def parameter_label(effect: str, parameter: str) -> str:
     return "" if effect in _COMPLETE else str(_WORDS["parts"].get(parameter, ""))
 
 
-def size_words(parameter: str, unit: str, size: float) -> str:
-    """``2.5 ms`` with two digits that count."""
+def size_words(parameter: str, unit: str, *sizes: float) -> str:
+    """``2.5 ms`` or ``2.5 to 12 ms``, with two digits that count."""
     factor, readable = readable_unit(parameter, unit)
-    value = factor * size
-    return with_unit(number(value, digits_of(value)), readable)
+    ends = dict.fromkeys(number(x, digits_of(x)) for x in (factor * size for size in sizes))
+    return with_unit(" to ".join(ends), readable)
 
 
 # --- sizes that laboratories meet ----------------------------------------------------------------

@@ -145,12 +145,12 @@ def _compared(first: pd.Series, together: bool) -> str:
         _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
     )
     n = int(first["trials"])
+    every = "all " if together and n > 1 else ""
+    others = "both other recordings" if every and n == 2 else every + count(n, "other recording")
     where = {
-        "whole_trials": f"in {count(n, 'other recording')} ",
-        "held_out": f"in seconds of {count(n, 'recording')} that were held out ",
+        "whole_trials": f"in {others} ",
+        "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
-    if together and where.startswith("in ") and n > 1:
-        where = "in both other recordings " if n == 2 else f"in all {where.removeprefix('in ')}"
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
     table, times = "RM (table)", "RM+mass (RM, scaled)"

@@ -3,7 +3,6 @@ still be used, and for what."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -24,7 +23,7 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of
+from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of, trial_label
 from bsip_cli.statistics.methods import OM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
@@ -72,7 +71,7 @@ def names_of(record: ParticipantRecord) -> dict[str, str]:
     """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
     tasks = [task_of(trial.stem) for trial in record.trials]
     return {
-        trial.stem: task if tasks.count(task) == 1 else re.sub(r"[()]", "", trial.label)
+        trial.stem: task if tasks.count(task) == 1 else trial_label(trial.stem, "{} {}")
         for trial, task in zip(record.trials, tasks, strict=True)
     }
 

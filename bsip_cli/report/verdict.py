@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -59,10 +58,8 @@ _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
-_UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
 MAY_HIDE = "Faults of any size may hide behind so large an error."
 NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
-_OR_THE_MASS = ", or the stated mass is wrong"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
 
@@ -140,7 +137,7 @@ def light_of(
     causes = causes_of(candidates_of(diagnosis))
     unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
     if unsure:
-        return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
+        return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].words.what)}.")
     looked = count(len(analysed(detection, diagnosis)), "recording")
     nothing = f"{capital(NONE_FOUND)} in {looked}."
     found = _how_many(causes)
@@ -206,8 +203,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
     where = where_seen(one.trials, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
     if is_large(cause):
-        error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
-        return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
+        return f"{capital(one.words.short)}, {where}; {one.words.against}."
     said = [one.against_usual(), f"; {at_joints}" if at_joints else ""]
     said += [f"; probability {sure}" if sure else ""]
     line = f"{capital(one.in_words(remarks=False))}, {where}{''.join(said)}."
@@ -216,23 +212,22 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     """What all say is said once."""
-    texts = [one.what().removesuffix(_OR_THE_MASS) for one in cause]
-    heads = {text.partition(": ")[0] for text in texts}
-    common = heads.pop() if len(heads) == 1 else ""
-    rest = [text.removeprefix(f"{common}: ") for text in texts]
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))
-        return f"{capital(common)}: either {', '.join(rest)}{_OR_THE_MASS} (probability of the last {mass})."
-    ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
+        either = ", ".join(one.words.short for one in cause)
+        return (
+            f"{capital(cause[0].words.against)}: either {either}, or the stated mass is wrong "
+            f"(probability of the last {mass})."
+        )
+    ranked = sorted(cause, key=lambda one: one.effect == UNNAMED)
     members = [
-        "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]
-        for one, text in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
+        "an error of unknown cause" if one.effect == UNNAMED else one.words.short or one.words.what
+        for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
     ]
-    places = Counter(effect_title(one.effect) for one, _ in ranked[len(members) :])
+    places = Counter(effect_title(one.effect) for one in ranked[len(members) :])
     others = [f"{title} ({n} places)" if n > 1 else title for title, n in places.items()]
-    head = f"{capital(common)}: one" if common else "One"
     return (
-        f"{head} of {len(cause)} causes that look alike here: {'; '.join((*members, *others))}. "
+        f"One of {len(cause)} causes that look alike here: {'; '.join((*members, *others))}. "
         f"Together {sure}."
     )
 
@@ -380,9 +375,9 @@ def change_sentence(changes: pd.DataFrame) -> str:
 def corrected_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
     """What ``ik`` has corrected, from (stem, ``marker-events``); nothing where there was nothing."""
     said = [
-        f"in {trial_label(stem)} {text.removesuffix('; corrected')}"
+        f"in {trial_label(stem)} {text}"
         for stem, table in events
-        for text in table.loc[table["put_right"].astype(bool), "sentence"]
+        for text in table.loc[table["put_right"].astype(bool), "what"]
     ]
     return (f"Corrected already, before the search for faults: {'; '.join(said)}.",) if said else ()
 

@@ -77,13 +77,13 @@ def count(n: int, singular: str, plural: str = "") -> str:
     return f"{n} {singular if n == 1 else plural or singular + 's'}"
 
 
-def trial_label(stem: str) -> str:
+def trial_label(stem: str, form: str = "{} ({})") -> str:
     """``sequence (session 2, run 1)`` for sub-01_ses-2_task-sequence_run-1."""
     match = _STEM.fullmatch(stem)
     if match is None:
         return stem
     which = ", ".join(f"{word} {match[word]}" for word in ("session", "run") if match[word])
-    return f"{match['task']} ({which})" if which else match["task"]
+    return form.format(match["task"], which) if which else match["task"]
 
 
 def task_of(stem: str) -> str:

@@ -8,8 +8,9 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.diagnosis.fault_scores import Library, limits_of
 from bsip_cli.diagnosis.fault_search import Found, Verdict
-from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, plain, start_s
+from bsip_cli.effects.effect import Number, Words
 from bsip_cli.running.unit import Unit
 
 
@@ -51,7 +52,7 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
     rows = []
     for rank, one in enumerate(findings, start=1):
         gain = zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)
-        known: dict = {name: getattr(one, name) for name in of_all} | dict(gain)
+        known: dict = {name: getattr(one, name) for name in of_all} | dict(gain) | vars(one.words)
         known |= {"rank": rank, "trials": ", ".join(one.trials)}
         own, known["persons"] = one.own, one.persons
         for x in one.numbers:
@@ -64,7 +65,7 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
 
 def nothing(p_value: float, trials: tuple[str, ...]) -> Finding:
     """That a diagnosis has found nothing."""
-    said = (Number("", "", np.nan),), "nothing wrong above the noise"
+    said = (Number("", "", np.nan),), Words("nothing wrong above the noise")
     return Finding("none", "", trials, *said, p_value, 1 - p_value, scope="")
 
 

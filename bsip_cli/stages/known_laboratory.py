@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.fault_model import FaultTrial
-from bsip_cli.diagnosis.findings import Finding, Number, interval_words
+from bsip_cli.diagnosis.findings import Finding, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
 from bsip_cli.diagnosis.shared_faults import (
     OF_A_LABORATORY,
@@ -21,7 +21,7 @@ from bsip_cli.diagnosis.shared_faults import (
     with_known,
 )
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Parameter, digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Number, Parameter
 from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record
@@ -56,7 +56,7 @@ class Known:
             if held:
                 columns = ["parameter", "unit", "estimate", "ci_low", "ci_high"]
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
-                words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
+                words = effect.words(held[0].scene, str(target), rows["estimate"].to_numpy())
                 known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
                 own = self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
                 yield Finding(
@@ -64,12 +64,13 @@ class Known:
                     str(target),
                     tuple(one.name for one in held),
                     numbers,
-                    words + interval_words(numbers) + known + _own_words(own, rows),
+                    words,
                     1 - float(first["probability"]),
                     float(first["probability"]),
                     scope="laboratory",
                     persons=int(first["persons"]),
                     own=own,
+                    closing=interval_words(numbers) + known + _own_words(own, rows),
                 )
 
     def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> Number | None:
@@ -138,12 +139,8 @@ def _own_words(own: Number | None, rows: pd.DataFrame) -> str:
     (known,) = rows.loc[rows["parameter"] == own.name, "estimate"]
     is_shown = own.low * own.high > 0 and own.value * known > 0
     how = "also show it" if is_shown else "leave it open"
-    factor, unit = readable_unit(own.name, own.unit)
-    digits = digits_of(factor * (own.high - own.low))
-    size, least, most = (f"{factor * x:.{digits}f}" for x in (own.value, own.low, own.high))
     return (
-        f", and this person's recordings alone {how}: {with_unit(size, unit)}, 95 % interval "
-        f"{with_unit(f'{least} to {most}', unit)}"
+        f", and this person's recordings alone {how}: {own.size()}, 95 % interval {own.interval()}"
     )
 
 

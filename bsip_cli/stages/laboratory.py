@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis import laboratory_search
-from bsip_cli.diagnosis.findings import Number, interval_words
+from bsip_cli.diagnosis.findings import interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Information
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Effect, Number, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.scene import Scene
 from bsip_cli.report.cohort.laboratory import named_sentences
@@ -244,7 +244,8 @@ def _words(cause: laboratory_search.Cause, sizes: Sequence[laboratory_search.Siz
     numbers = tuple(
         Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in sizes
     )
-    return _effect(cause).sentence(_NO_SCENE, cause.target, values) + interval_words(numbers)
+    words = _effect(cause).words(_NO_SCENE, cause.target, values)
+    return words.what + interval_words(numbers)
 
 
 def _sentence(

@@ -81,7 +81,7 @@ def test_a_marker_that_sits_wrong_throughout_has_its_size():
     (found,) = proofs(scene, before)
     low, size, high = numbers(scene, found)["shift"]
     assert low < 0.025 < high and size == pytest.approx(0.025, abs=0.004)
-    assert "throughout" in found.effect.sentence(scene, found.target, found.values)
+    assert "throughout" in found.effect.words(scene, found.target, found.values).what
     assert len(proofs(scene, replace(before, least_m=0.018))) == 1
     assert proofs(scene, replace(before, least_m=0.032)) == ()
 

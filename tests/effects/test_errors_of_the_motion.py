@@ -103,7 +103,7 @@ def test_a_shift_is_throughout_on_every_clock():
         scene = replace(moving(), times_s=moving().times_s + first_s)
         throughout = MarkerShift().parameters(scene, "RKNEL")[3].scan[0]
         said = [
-            MarkerShift().sentence(scene, "RKNEL", np.array([0.02, 0.0, 0.0, start, 0.0]))
+            MarkerShift().words(scene, "RKNEL", np.array([0.02, 0.0, 0.0, start, 0.0])).what
             for start in (throughout, first_s + 2.0)
         ]
         assert said[0].endswith("throughout")

@@ -79,7 +79,9 @@ def test_a_typical_size_is_possible_visible_and_in_words(effect, scene):
         values[1:4] = 0
     assert effect.possible(scene, target, values)
     assert np.abs(effect.change(scene, target, values)).max() > 0.1
-    sentence = effect.sentence(scene, target, values)
+    words = effect.words(scene, target, values)
+    sentence = words.what
+    assert sentence.startswith(words.short) and len(words.short) < len(sentence)
     assert "_" not in sentence and not sentence.endswith(".") and len(sentence) > 20
     assert effect.remedy and "_" not in effect.remedy
 

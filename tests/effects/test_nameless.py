@@ -133,7 +133,7 @@ def test_a_zero_is_no_regularity(scene):
 
 
 def test_what_an_error_goes_along_with_is_said(scene):
-    one = Course().sentence(scene, "fz by load", np.array([10.0, 0, 0, 0]))
+    one = Course().words(scene, "fz by load", np.array([10.0, 0, 0, 0])).what
     assert one.endswith("N (RMS) that goes along with the load")
     (name, unit, size), _ = Course().reported(scene, "all by time", np.ones(24))
     assert (name, unit) == ("force", "N") and size > 1
@@ -148,5 +148,5 @@ def test_a_mean_is_constant_about_where_the_person_stands(scene):
 
 def test_a_mean_in_words(scene):
     one = Mean({"mz": 2.0})
-    said = one.sentence(scene, "mz by mean", np.array([-3.0]))
+    said = one.words(scene, "mz by mean", np.array([-3.0])).what
     assert said.startswith("of unknown cause: a constant error of") and "-3.0 N m" in said

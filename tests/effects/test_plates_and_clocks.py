@@ -133,14 +133,14 @@ def test_crosstalk_of_all_plates_is_that_of_each():
     assert "all fz>fx" in effect.targets(scene)
     each = [effect.change(scene, f"{plate} fz>fx", size) for plate in (1, 2)]
     np.testing.assert_allclose(effect.change(scene, "all fz>fx", size), sum(each))
-    assert "of all plates leaks" in effect.sentence(scene, "all fz>fx", size)
+    assert "of all plates leaks" in effect.words(scene, "all fz>fx", size).what
 
 
 def test_an_offset_in_fz_makes_everybody_heavier():
     scene = scene_with(lambda r: r)[0]
     change = PlateZero().change(scene, "1 fz", np.array([9.80665]))
     np.testing.assert_allclose(change[:, 2], 9.80665)
-    assert "+9.8 N" in PlateZero().sentence(scene, "1 fz", np.array([9.80665]))
+    assert "+9.8 N" in PlateZero().words(scene, "1 fz", np.array([9.80665])).what
 
 
 def test_a_shifted_plate_shows_the_pressure_short_of_the_shift():
@@ -186,7 +186,7 @@ def test_two_plates_err_together_as_one_plate_under_both_feet(effect, values):
     alone = replace(scene, plates=(one,))
     together = effect.change(scene, "all", np.array(values))
     np.testing.assert_allclose(together, effect.change(alone, "1", np.array(values)), atol=1e-8)
-    assert effect.sentence(scene, "all", np.array(values)).startswith("all plates ")
+    assert effect.words(scene, "all", np.array(values)).what.startswith("all plates ")
     assert "all" in effect.targets(scene) and "all" not in effect.targets(alone)
 
 
@@ -194,7 +194,7 @@ def test_a_gain_of_all_plates_is_that_of_each():
     scene, effect, gain = moving(), PlateGain(), np.array([0.03])
     each = [effect.change(scene, f"{plate.name} fz", gain) for plate in scene.plates]
     np.testing.assert_allclose(effect.change(scene, "all fz", gain), sum(each), atol=1e-8)
-    assert effect.sentence(scene, "all fz", gain) == (
+    assert effect.words(scene, "all fz", gain).what == (
         "all plates read the vertical force 3.0 % too large"
     )
 
@@ -262,10 +262,10 @@ def test_what_the_motion_does_wrong_makes_no_delay_smaller():
 
 def test_words_for_the_order_of_clocks():
     scene, delay = standing_still(), SyncOffset()
-    assert delay.sentence(scene, "", np.array([0.01])).endswith("10.0 ms after the markers")
-    assert delay.sentence(scene, "", np.array([-0.01])).endswith("10.0 ms before the markers")
-    assert "at 0.833 times" in FrameRate().sentence(scene, "", np.array([1 / 1.2 - 1]))
-    assert "1000 ppm slower" in ClockDrift().sentence(scene, "", np.array([1e-3]))
+    assert delay.words(scene, "", np.array([0.01])).what.endswith("10.0 ms after the markers")
+    assert delay.words(scene, "", np.array([-0.01])).what.endswith("10.0 ms before the markers")
+    assert "at 0.833 times" in FrameRate().words(scene, "", np.array([1 / 1.2 - 1])).what
+    assert "1000 ppm slower" in ClockDrift().words(scene, "", np.array([1e-3])).what
 
 
 def test_a_standing_person_weighs_what_the_scene_says():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.diagnosis.findings import Number, interval_words
-from bsip_cli.effects.effect import digits_of
+from bsip_cli.diagnosis.findings import interval_words
+from bsip_cli.effects.effect import Number, digits_of
 
 
 @pytest.mark.parametrize(

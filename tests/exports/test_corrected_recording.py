@@ -21,7 +21,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
 from bsip_cli.commands.named_causes import causes_here, why_left
-from bsip_cli.diagnosis.findings import Number
+from bsip_cli.effects.effect import Number
 from bsip_cli.instruments.c3d_file import wired_plates
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
@@ -130,7 +130,8 @@ def hide(tmp_path, plain):
         nothing = empty_table("marker-events")
         swaps = [
             dict.fromkeys(nothing.columns, 0.0)
-            | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
+            | dict.fromkeys(("sentence", "what", "when"), "")
+            | {"kind": "swap", "marker": PAIR[0], "partner": PAIR[1]}
             | {"start_s": start, "end_s": end - 0.01, "put_right": True}
             for start, end in SWAPS
             if any(one.name == "marker_swap" for one in asked)

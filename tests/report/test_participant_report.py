@@ -171,7 +171,7 @@ def test_the_light_has_four_states(record):
     assert fine.state == "fine"
     assert re.fullmatch(r"None of the \d+ faults that bsip knows was found in 2 .*", fine.text)
     large = found[found["rank"] == 1].assign(
-        effect="unexplained", target="", parameter="error", sentence="large error, cause unknown"
+        effect="unexplained", target="", parameter="error", what="large error, cause unknown"
     )
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
@@ -183,7 +183,7 @@ def test_the_light_has_four_states(record):
     )
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
-    unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
+    unsure = large.assign(effect="inconclusive", parameter="", what="too short")
     assert (light(record, unsure).state, light(record, unsure).text) == (
         "inconclusive",
         "Too short.",
@@ -236,6 +236,8 @@ def test_rm_is_used_where_nothing_is_sure(record):
     one = use_sentence(record.choice[:1], record.identification)
     assert one.startswith("Use OM (parameters identified from this person): in 2 other recordings")
     assert "it errs 34 to 46 % less than RM (table)," in one
+    held = use_sentence(record.choice.assign(data="held_out"), record.identification)
+    assert ": in all seconds of 2 recordings that were held out it errs 34 to 46 % less" in held
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

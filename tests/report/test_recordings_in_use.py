@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.commands.show import shown
-from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.findings import Finding
+from bsip_cli.effects.effect import Number, Words
 from bsip_cli.report.blocks import Links, Numbered
 from bsip_cli.report.candidates import candidates_of, causes_of
 from bsip_cli.report.effect_words import effect_title
@@ -213,7 +214,7 @@ def test_a_fault_that_makes_the_largest_part_is_named(record):
 def test_a_large_error_elsewhere_is_a_finding_of_its_own(record):
     """The diagnosis speaks of the recording that is not the worst."""
     error = fault("unexplained", SEQUENCE, target="", parameter="error").assign(
-        sentence="large error, cause unknown: 21 N of the vertical force remain unexplained"
+        short="21 N of the vertical force remain unexplained", against="large is 15 N and more"
     )
     far = with_error(with_faults(record, error), BASKETBALL, rmse_percent_bw=9.0)
     assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
@@ -348,7 +349,7 @@ def test_of_two_sizes_it_is_said_with_which_to_correct(own, short, full):
 def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
     sizes = Number("y", "m", 0.001), Number("x", "m", 0.02, 0.019, 0.021)
     own = Number("x", "m", 0.018, 0.01, 0.026)
-    said = sizes, "plate 1 is shifted", 0.01, 0.99
+    said = sizes, Words("plate 1 is shifted"), 0.01, 0.99
     shared = Finding("plate_translation", "1", (SEQUENCE,), *said, persons=7, own=own)
     mine = Finding("plate_translation", "2", (SEQUENCE,), *said)
     first, second = candidates_of(rows_of((shared, mine), (SEQUENCE,)))

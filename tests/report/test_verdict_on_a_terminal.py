@@ -25,7 +25,7 @@ def test_causes_are_numbered_and_lines_fit():
 
 
 def test_what_was_put_right_is_told_too():
-    events = marker_events().assign(put_right=True, sentence="A and B bear labels; corrected")
+    events = marker_events().assign(put_right=True, what="A and B bear labels")
     right = corrected_sentence([(TRIALS[0], events)])
     assert right == (
         "Corrected already, before the search for faults: in sequence (run 1) A and B bear labels.",
@@ -35,7 +35,7 @@ def test_what_was_put_right_is_told_too():
 
 
 def test_a_file_cannot_send_commands_to_the_terminal():
-    table = diagnosis(TRIALS).assign(sentence="marker \x1b[2J\x07KNEE\u202e sits wrong")
+    table = diagnosis(TRIALS).assign(what="marker \x1b[2J\x07KNEE\u202e sits wrong")
     text = text_of(table)
     assert "Marker ?[2J?KNEE? sits wrong" in text
     assert all(c.isprintable() or c == "\n" for c in text)

@@ -48,7 +48,6 @@ from bsip_cli.report.words import (
     capital,
     component_label,
     count,
-    labelled,
     listing,
     number,
     percent,
@@ -177,15 +176,12 @@ def is_far(values: np.ndarray, good: float, limit: float) -> np.ndarray:
 
 
 def _missing(record: CohortRecord) -> list[str]:
-    sentences = list(record.missing)
-    for member in record.members:
-        sentences += [
-            f"{', '.join(filter(None, (member.id, r.unit)))}, {r.stage} refused: {r.sentence}"
-            for r in member.refusals
-        ]
-        if member.identification is None and not any(member.id in s for s in sentences):
-            sentences.append(f"{member.id} has no identified parameters; no refusal says why.")
-    return list(dict.fromkeys(sentences))
+    refused = [
+        f"{', '.join(filter(None, (member.id, r.unit)))}, {r.stage} refused: {r.sentence}"
+        for member in record.members
+        for r in member.refusals
+    ]
+    return list(dict.fromkeys((*record.missing, *refused)))
 
 
 # --- people -------------------------------------------------------------------------------------
@@ -424,7 +420,7 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
     of_movements: dict[str, list[str]] = {}
     for one in people:
         if one.was_searched and not one.causes:
-            movements = labelled(listing(list(one.trials)))
+            movements = listing([trial_label(stem) for stem in one.trials])
             where = f" (searched: {movements})" if one.trials else ""
             of_movements.setdefault(where, []).append(one.id)
     return [
@@ -438,6 +434,6 @@ def _cause_row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
         texts[0] if len(texts) == 1 else f"One of these: {'; '.join(texts)}",
-        labelled(listing(list(dict.fromkeys(t for one in cause for t in one.trials)))),
+        listing([*dict.fromkeys(trial_label(stem) for one in cause for stem in one.trials)]),
         probability_words(probability_of(cause)) or MISSING,
     )

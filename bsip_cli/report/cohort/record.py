@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Number, digits_of, readable_unit, with_unit
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
+from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table

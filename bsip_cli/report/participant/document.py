@@ -436,10 +436,4 @@ def _range(effect: str, limits: Sequence[Limit]) -> str:
         return "not at all"
     if not isfinite(worst.size) or (usual.unit == best.unit and worst.size > _FAR * usual.most):
         return f"from {best.in_words()}, or not at all"
-    words = [
-        effect_words.size_words(best.parameter, best.unit, size) for size in (best.size, worst.size)
-    ]
-    if words[0] == words[1]:
-        return words[0]
-    first = words[0].removesuffix("°") if words[0].endswith("°") else words[0].partition(" ")[0]
-    return f"{first} to {words[1]}"
+    return effect_words.size_words(best.parameter, best.unit, best.size, worst.size)

@@ -24,7 +24,6 @@ from tests.marker_evidence.swinging_markers import (
     recording,
 )
 
-
 OF_MANY = [
     name
     for k, name in enumerate(PERSON.skeleton.segments)
@@ -59,7 +58,7 @@ def test_a_swap_is_undone(a, b, frames):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("segment", OF_MANY)
 def test_a_segment_whose_markers_are_in_another_order_is_put_right(segment, seed):
-    """The pose follows labels that are exchanged all together: no pair lies at the other's place."""
+    """The pose follows labels that are exchanged all together: no pair need show it."""
     times, clean, _ = recording(seed, skin_m=0.003)
     mine = [
         k for k, s in enumerate(PERSON.marker_segments) if PERSON.skeleton.segments[s] == segment

@@ -131,9 +131,9 @@ class C3dPlate:
         return replace(self, description=description, is_mirrored=is_mirrored)
 
     def alternatives(self) -> Iterable[PlateReading]:
-        """Moments of type 3 have no unit of their own, type 1 no point that they are about."""
+        """Type 3 has no moments of its own, type 1 no point that they are about."""
         kind = self.description.kind
-        scales = (1.0, -1.0) if kind == 3 else (1.0, 1e-3, 1e3, -1.0, -1e-3, -1e3)
+        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0, -1e-3, -1e3)
         abouts: tuple[Reference, ...] = ("stated",)
         if kind in (2, 4) and self.description.origin_m[:2].any():
             abouts += ("reversed", "centred")

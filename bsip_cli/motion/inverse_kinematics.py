@@ -9,8 +9,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import Person, rigid_motion
-from bsip_cli.dynamics.ground_wrench import pinocchio_model
-from bsip_cli.dynamics.segment_motion import segment_motion
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion import kernel
 
@@ -241,17 +239,21 @@ def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np
 
     ``prior_rad`` is the posture prior's standard deviation over that of the markers.
     """
-    model, count = pinocchio_model(person), len(q)
-    each = np.tile(np.eye(model.nv), (count, 1))
-    motion = segment_motion(model, np.repeat(q, model.nv, axis=0), np.zeros_like(each), each)
-    prior = [0.0] * 6 + [prior_rad**-2] * (model.nv - 6)
-    information = np.tile(np.diag(prior), (count, 1, 1))
-    places = zip(person.marker_segments, person.markers_in_joint_m(), strict=True)
-    for (segment, place), weight in zip(places, person.marker_weights, strict=True):
-        # at rest, a point's acceleration is what one unit of each coordinate's moves it
-        moved = motion.point(segment, place).acceleration_m_s2.reshape(count, model.nv, 3)
-        information += weight * moved @ moved.swapaxes(1, 2)
-    return np.linalg.inv(information)
+    tree = tree_of(person)
+    R, p = tree.forward(q)
+    columns = pose_columns(tree, R, p, model_markers(person, R, p), subtrees(person))
+    return np.linalg.inv(coordinate_information(person, columns, prior_rad))
+
+
+def coordinate_information(person: Person, columns: np.ndarray, prior_rad: float) -> np.ndarray:
+    """(N, nv, nv) the inverse of that covariance, of markers that move by ``columns`` (N, m, 3, nv)
+    for each unit velocity."""
+    weighted = columns * np.sqrt(person.marker_weights)[:, None, None]
+    flat = weighted.reshape(len(columns), -1, columns.shape[-1])
+    information = np.einsum("fki,fkj->fij", flat, flat, optimize=True)
+    turns = range(6, columns.shape[-1])
+    information[:, turns, turns] += prior_rad**-2
+    return information
 
 
 # --- how the pose answers to small errors of the markers, and what it leaves of them --------------

@@ -28,7 +28,7 @@ from bsip_cli.effects.body import SegmentInertia
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.inverse_kinematics import coordinate_covariance
+from bsip_cli.motion.inverse_kinematics import coordinate_information
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
@@ -278,7 +278,7 @@ def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.nd
     starts = np.array(person.skeleton.v_starts)
     joint = np.searchsorted(starts, range(trial.v.shape[1]), side="right") - 1
     known = ~person.without_data()[joint]
-    information = np.linalg.inv(coordinate_covariance(person, trial.q[some], _WEAK_PRIOR))
+    information = coordinate_information(person, _columns(person, trial.q[some]), _WEAK_PRIOR)
     covariance = np.zeros_like(information)
     inner = np.linalg.inv(information[:, known][:, :, known])
     covariance[:, np.outer(known, known)] = inner.reshape(len(some), -1)
@@ -290,6 +290,18 @@ def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.nd
         signal = interp1d(some, signal, axis=1)(near)
     force, moment = signal * trial.pelvis_noise[:, None, None]
     return force, moment
+
+
+def _columns(person: Person, q: np.ndarray) -> np.ndarray:
+    """(N, m, 3, nv) how the markers move for each unit velocity in poses (N, nq): so a marker of a
+    body at rest is accelerated by a unit acceleration. No compiled code is loaded for a few poses.
+    """
+    model = pinocchio_model(person)
+    each = np.tile(np.eye(model.nv), (len(q), 1))
+    motion = segment_motion(model, np.repeat(q, model.nv, axis=0), np.zeros_like(each), each)
+    places = zip(person.marker_segments, person.markers_in_joint_m(), strict=True)
+    moved = np.stack([motion.point(i, place).acceleration_m_s2 for i, place in places], axis=1)
+    return moved.reshape(len(q), model.nv, -1, 3).transpose(0, 2, 3, 1)
 
 
 # --- with the causes that the diagnosis named --------------------------------------------------

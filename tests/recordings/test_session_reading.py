@@ -68,16 +68,6 @@ def of_sensors(one: str = "", other: str = "") -> list[C3dPlate]:
     return sources
 
 
-def of_sensors_whose_moments_are_reversed() -> list[C3dPlate]:
-    """As where software wrote the eight channels."""
-    sources = of_sensors()
-    matrix = wrench_matrix(sources[0].description)
-    back = np.linalg.pinv(matrix)
-    # What no wrench shows, the load of one diagonal, stays.
-    turned = back @ np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]) @ matrix + np.eye(8) - back @ matrix
-    return [replace(plate, measured=plate.measured @ turned.T) for plate in sources]
-
-
 def of_points(
     exchanged: bool = False, point_scale: float = 1.0, torque_scale: float = 1.0
 ) -> list[C3dPlate]:
@@ -148,11 +138,6 @@ FAULTS = {
     "Fx and Fy reversed": (of_c3d_with_level_reversed, {}, "reversed Fx and Fy"),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
     "eight sensors, sound": (of_sensors, {}, ""),
-    "eight sensors, moments reversed": (
-        of_sensors_whose_moments_are_reversed,
-        {},
-        "reversed the moments",
-    ),
     "a point and a torque, sound": (of_points, {}, ""),
     "a torque in N mm": (of_points, {"torque_scale": 1e3}, "N mm"),
     "a point in m, taken for mm": (of_points, {"point_scale": 1e-3}, "points of force in m"),

@@ -118,6 +118,9 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"
+        own = next(size for one, size in _own(record, worst) if one == found[0][0])
+        if (size := number(own)) != number(found[0][1]):  # of all recordings together
+            said += f" ({size} {found[0][0].brief_unit()})"
     if all(one.name == MARKERS for one, _ in found):
         return (f"{said}.",)
     return (f"{said}; {_why_large(record, worst)}.",)

@@ -53,7 +53,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     force = np.linalg.norm(pose.force_N)
     lines = [
         canvas.plain(trial, _LONGEST) + f", {pose.time_s:.2f} s",
-        "black: right limbs; grey: left",
+        "black: right limbs; grey: left; blue: markers",
     ]
     lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
     figure.supxlabel("\n".join(lines), fontsize=7.5, color=canvas.SOFT)

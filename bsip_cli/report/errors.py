@@ -111,23 +111,28 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
 
 
 def use_sentence(
-    choice: pd.DataFrame | None, identification: pd.DataFrame, waits: bool = False
+    choice: pd.DataFrame | None,
+    identification: pd.DataFrame,
+    waits: bool = False,
+    is_known: bool = False,
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names. ``waits``: something else is to be done first."""
+    the artifacts of these names. ``waits``: something else is to be done first; ``is_known``: what
+    the method is has been said."""
     use = "Once that is solved, use" if waits else "Use"
     if choice is None or choice.empty:
-        return f"{use} {TEXTS['methods_in_full'][RM]}: nothing was compared."
+        return f"{use} {RM if is_known else TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
+    brief = (lambda method: method) if is_known else TEXTS["methods"].__getitem__
     others = [
-        f"{TEXTS['methods'][str(method)]} for {listing(list(rows['movement']))}, where OM is "
+        f"{brief(str(method))} for {listing(list(rows['movement']))}, where OM is "
         f"{'' if method == OM else 'not '}clearly better"
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    most = TEXTS["methods_in_full"][str(first["use"])]
+    most = str(first["use"]) if is_known else TEXTS["methods_in_full"][str(first["use"])]
     if others:
-        most = f"{TEXTS['methods'][str(first['use'])]} for all other movements"
+        most = f"{brief(str(first['use']))} for all other movements"
     said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
     rare = identification[identification["rare"].astype(bool)]
     warned = [

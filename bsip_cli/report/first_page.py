@@ -26,8 +26,8 @@ from bsip_cli.report.recordings import (
     use_lines,
     worst_of,
 )
-from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, listing, number
+from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
+from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
 from bsip_cli.statistics.methods import RM
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
         blocks.Heading("What may be used?"),
         blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
-            use_sentence(record.choice, record.identification, waits=must_wait(record))
+            use_sentence(record.choice, record.identification, must_wait(record), is_known=True)
         ),
         blocks.Heading("What to do next"),
         blocks.Bullets(tuple(to_do(record, light))),
@@ -76,7 +76,10 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     times = {name: names.count(name) for name in names}
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
     short = abbreviations(names)
-    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}"
+    stems = tuple(f"{trial.stem}." for trial in record.trials)
+    files = sum(name.startswith(stems) for name in HowMade.of(record.origins).files)
+    said = [*([short] if short else []), f"{count(files, 'file')}, named below"]
+    yield "Recordings", f"{listing(tasks)} ({'; '.join(said)})"
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
@@ -190,7 +193,8 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     for one, size in measured_of(record):
         other = table.get(one.name, number(size))
         scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
-    yield blocks.Heading(f"How large are the errors with {METHODS[use]}?")
+    named = use if large_finding(record) else METHODS[use]  # the finding says what it is
+    yield blocks.Heading(f"How large are the errors with {named}?")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(SOURCES, "note")
     yield from bar

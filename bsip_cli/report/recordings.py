@@ -121,9 +121,8 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
         own = next(size for one, size in _own(record, worst) if one == found[0][0])
         if (size := number(own)) != number(found[0][1]):  # of all recordings together
             said += f" ({size} {found[0][0].brief_unit()})"
-    if all(one.name == MARKERS for one, _ in found):
-        return (f"{said}.",)
-    return (f"{said}; {_why_large(record, worst)}.",)
+    why = "" if all(one.name == MARKERS for one, _ in found) else _why_large(record, worst)
+    return (f"{said}; {why}." if why else f"{said}.",)
 
 
 def is_said(record: ParticipantRecord) -> bool:
@@ -136,14 +135,16 @@ def is_said(record: ParticipantRecord) -> bool:
 
 
 def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
-    """What makes the largest part, as far as the budget of the parameters to use tells."""
+    """What makes the largest part, as far as the budget of the parameters to use tells; nothing
+    where the light says it."""
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
     if part is None:
         if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
             return "other findings explain part at most"
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
-    number_of = number_of_main_part(record)
-    return f"the largest part is {f'finding {number_of}' if number_of else part.label}"
+    if number_of := number_of_main_part(record):
+        return f"the largest part is finding {number_of}"
+    return "" if part.label in light_for(record).title else f"the largest part is {part.label}"
 
 
 def number_of_main_part(record: ParticipantRecord) -> int:

@@ -144,10 +144,10 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "Markers from model: 6.7 mm , good" in first
     assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
     assert (
-        "Once that is solved, use RM (table) for basketball, where OM is not clearly better, and "
-        "OM (identified) for all other movements: in both other recordings it errs 34 to 46 % less "
-        "than RM," in first
+        "Once that is solved, use RM for basketball, where OM is not clearly better, and OM for "
+        "all other movements: in both other recordings it errs 34 to 46 % less than RM," in first
     )
+    assert re.search(r"\(\d+ files?, named below\)", first)
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
 

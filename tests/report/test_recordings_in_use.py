@@ -206,6 +206,9 @@ def test_a_fault_that_makes_the_largest_part_is_named(record):
     known = replace(far, budget=far.budget.assign(term=term))
     assert number_of_main_part(known) == 2
     assert large_finding(known)[0].endswith("; the largest part is finding 2.")
+    table = replace(far, choice=record.choice.assign(use="RM"))  # whose part the light says
+    assert "the table's segment parameters" in light_for(table).title
+    assert "part" not in large_finding(table)[0]
     *_, to_do = front(known)
     assert to_do.items[0].startswith("Finding 2: Correct the forces")  # and no search for the cause
     assert number_of_main_part(far) == 0

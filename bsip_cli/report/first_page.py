@@ -78,7 +78,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     short = abbreviations(names)
     stems = tuple(f"{trial.stem}." for trial in record.trials)
     files = sum(name.startswith(stems) for name in HowMade.of(record.origins).files)
-    said = [*([short] if short else []), f"{count(files, 'file')}, named below"]
+    said = [*([short] if short else []), count(files, "file")]
     yield "Recordings", f"{listing(tasks)} ({'; '.join(said)})"
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used

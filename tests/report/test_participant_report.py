@@ -147,7 +147,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "Once that is solved, use RM for basketball, where OM is not clearly better, and OM for "
         "all other movements: in both other recordings it errs 34 to 46 % less than RM," in first
     )
-    assert re.search(r"\(\d+ files?, named below\)", first)
+    assert re.search(r"\(\d+ files?\)", first)
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
 

@@ -51,7 +51,7 @@ def participant_document(record: records.ParticipantRecord) -> Document:
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
-        subtitle="Ground forces of plates against those computed from markers.",
+        subtitle="Plates' ground forces against those computed from markers.",
         front=front(record),
         sections=(
             diagnosis_section(record),

@@ -133,13 +133,8 @@ def joint_loads(
     beyond = [skeleton.beyond(i) for i in range(1, len(joints) + 1)]
     carries = np.array([np.isin(skeleton.bodies, list(segments)) for segments in beyond])
     ends = (list(skeleton.parents[1:]), list(range(1, len(joints) + 1)))
-    levers = []  # (J, 2, 3): how its own segment's turns move the first axis, Z, and the third, Y
-    for end, axis in zip(ends, (2, 1), strict=True):
-        if spread.turns_rad2 is not None:
-            across = np.delete(np.eye(3), axis, axis=0)
-            moved = across @ skew(np.eye(3)[axis])
-            covariance = moved @ spread.turns_rad2[end] @ moved.T
-            levers.append(np.linalg.cholesky(covariance).swapaxes(1, 2) @ across)
+    turns = spread.turns_rad2  # of the segments that carry the first axis, Z, and the third, Y
+    levers = [] if turns is None else [_lever(turns[ends[0]], 2), _lever(turns[ends[1]], 1)]
     for start in range(0, len(q), block):
         now = slice(start, start + block)
         motion = segment_motion(model, q[now], v[now], a[now])
@@ -156,16 +151,7 @@ def joint_loads(
             about[3:, :3] = skew(one.noise_at_m[None])[0]
             variance[now, on] += (onto[:, on] @ about) ** 2 @ one.noise[now, None, :, None] ** 2
         value[now] = onto @ wrench
-        some = np.unique(np.append(np.arange(0, len(rows), every), len(rows) - 1))
-        fewer = rows[some].swapaxes(1, 2)
-        for j, bodies in enumerate(carries):
-            own = onto[some, j] @ fewer[:, :, bodies].reshape(len(some), 6, -1)
-            columns = np.repeat(bodies, 10)
-            for m, covariance in enumerate(spread.covariances):
-                if covariance is not None:
-                    part = covariance[np.ix_(columns, columns)]
-                    of_each = np.einsum("nij,nij->ni", own @ part, own)
-                    variance[now, j, :, m] += _between(some, of_each, len(rows))
+        variance[now] += _of_parameters(rows, onto, carries, spread.covariances, every)
         force = wrench[:, :, :3]
         moment = wrench[:, :, 3:] - skew(centres) @ force
         squares = np.einsum("njck,njck->njk", force, force)[:, :, None]
@@ -178,6 +164,41 @@ def joint_loads(
             variance[now] += np.concatenate([shown[..., :k], shown[..., k:]], axis=2)
     sd = np.sqrt(variance)
     return JointLoads(joints, value[:, :, :3], value[:, :, 3:], rates, sd[:, :, :3], sd[:, :, 3:])
+
+
+def _of_parameters(
+    rows: np.ndarray,
+    onto: np.ndarray,
+    carries: np.ndarray,
+    covariances: Sequence[np.ndarray | None],
+    every: int,
+) -> np.ndarray:
+    """Variance (n, J, 6, k) by errors of the inertial parameters.
+
+    rows (n, b, 6, 10) : ground wrench of each body by its parameters; onto (n, J, 6, 6) : of a
+    wrench at a joint. carries (J, b) : whether a joint carries a body. every : as in `joint_loads`.
+    """
+    some = np.unique(np.append(np.arange(0, len(rows), every), len(rows) - 1))
+    fewer = rows[some].swapaxes(1, 2)
+    variance = np.zeros((len(rows), len(carries), 6, len(covariances)))
+    for j, bodies in enumerate(carries):
+        own = onto[some, j] @ fewer[:, :, bodies].reshape(len(some), 6, -1)
+        columns = np.repeat(bodies, 10)
+        for m, covariance in enumerate(covariances):
+            if covariance is not None:
+                part = covariance[np.ix_(columns, columns)]
+                of_each = np.einsum("nij,nij->ni", own @ part, own)
+                variance[:, j, :, m] = _between(some, of_each, len(rows))
+    return variance
+
+
+def _lever(turns_rad2: np.ndarray, axis: int) -> np.ndarray:
+    """(J, 2, 3) how turns of one standard deviation, with covariances (J, 3, 3), move an axis of
+    their frames in two directions across it."""
+    across = np.delete(np.eye(3), axis, axis=0)
+    moved = across @ skew(np.eye(3)[axis])
+    covariance = moved @ turns_rad2 @ moved.T
+    return np.asarray(np.linalg.cholesky(covariance).swapaxes(1, 2) @ across)
 
 
 def _of_turns(axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarray) -> np.ndarray:

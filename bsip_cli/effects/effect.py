@@ -192,7 +192,7 @@ def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:
     return tuple((f"{name}_{axis}", unit, float(x)) for axis, x in zip("xyz", values, strict=False))
 
 
-# --- the units and digits in which people read the sizes of effects -------------------------------
+# --- what is made of an effect --------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -255,6 +255,8 @@ class Judged:
     persons: int = 0
     own: Number | None = None
 
+
+# --- the units and digits in which people read the sizes of effects -------------------------------
 
 _SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
 _PLAIN_NUMBERS = ("damping_ratio", "rate_ratio")

@@ -26,7 +26,7 @@ reported, with the distance it moved by on its segment and not the smaller resid
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,13 +47,14 @@ from bsip_cli.motion.marker_exchange import (
     Labelling,
     Refit,
     as_recorded,
+    best_fitting,
     exchanged,
     exchanged_back,
     misfit_m,
     refitted,
     reordered,
+    some_frames,
     swaps,
-    with_exchanges,
 )
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
 from bsip_cli.segments import mirrored
@@ -67,7 +68,6 @@ _ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
 _LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
 _LATERAL_M = 0.05  # a marker of the trunk this far from its middle belongs to a side
 _MIRRORED_M = 0.1  # the places of a pair are mirrored to this
-_FRAMES = 24
 
 
 def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
@@ -78,20 +78,14 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
     with the limbs exchanged; if that at least halves the residual of all markers, they are.
     """
     whole = slice(0, len(fit.times_s))
-    frames = np.unique(np.linspace(0, whole.stop - 1, _FRAMES).astype(int))
-    before = misfit_m(fit.distance_m()[frames])
+    before = misfit_m(fit.distance_m()[some_frames(fit)])
     if not before > _FAR * fit.trusted_m.min():
         return as_recorded(fit)
-    tried = []
-    for limb in _LIMBS:
-        pairs = _mirrored_pairs(fit, limb)
-        markers = with_exchanges(fit, [Exchange(a, b, whole, 1.0) for a, b in pairs])
-        again = refit(markers[frames], fit.times_s[frames])
-        tried.append((misfit_m(again.distance_m()), pairs))
-    after, pairs = min(tried, key=lambda one: one[0])
+    limbs = [[Exchange(a, b, whole, 1.0) for a, b in _mirrored_pairs(fit, limb)] for limb in _LIMBS]
+    after, found = best_fitting(fit, refit, limbs)
     if not after < _BETTER * before:
         return as_recorded(fit)
-    suspected = [Exchange(a, b, whole, before / after) for a, b in pairs]
+    suspected = [replace(one, statistic=before / after) for one in found]
     return exchanged_back(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
 
 

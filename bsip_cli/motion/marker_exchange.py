@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
@@ -63,6 +63,27 @@ def with_exchanges(fit: MarkerFit, exchanges: Sequence[Exchange]) -> np.ndarray:
 def refitted(fit: MarkerFit, refit: Refit, exchanges: Sequence[Exchange]) -> MarkerFit:
     """The poses fitted again with these labels exchanged."""
     return refit(with_exchanges(fit, exchanges), fit.times_s)
+
+
+_FRAMES = 24  # that show which exchanges are the likeliest
+
+
+def some_frames(fit: MarkerFit) -> np.ndarray:
+    """(k,) evenly over the trial."""
+    return np.unique(np.linspace(0, len(fit.times_s) - 1, _FRAMES).astype(int))
+
+
+def best_fitting(
+    fit: MarkerFit, refit: Refit, tried: Iterable[Sequence[Exchange]]
+) -> tuple[float, Sequence[Exchange]]:
+    """Those exchanges with which poses fitted to some frames lie nearest to the markers, and how
+    near [m]."""
+    frames = some_frames(fit)
+    misfits = []
+    for exchanges in tried:
+        again = refit(with_exchanges(fit, exchanges)[frames], fit.times_s[frames])
+        misfits.append((misfit_m(again.distance_m()), exchanges))
+    return min(misfits, key=lambda one: one[0])
 
 
 def exchanged_back(
@@ -126,8 +147,8 @@ def _comes_nearer(one: Exchange, before: MarkerFit, after: MarkerFit) -> bool:
 # --- the markers of a segment in another order, throughout ----------------------------------------
 
 
-_FRAMES = 24  # that are looked at
-_FEWEST, _MOST_MARKERS = 4, 7  # of a segment: fewer show no order, more are 5,040 orders
+# Of a segment: three show an order by their sides alone, eight have 40,320.
+_FEWEST, _MOST_MARKERS = 4, 7
 _LIKELY = 8  # orders that are fitted
 
 
@@ -140,7 +161,7 @@ def reordered(labelling: Labelling, refit: Refit) -> Labelling:
     these orders it is, of those that are nearly alike.
     """
     fit = labelling.fit
-    frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _FRAMES).astype(int))
+    frames = some_frames(fit)
     whole, limit = slice(0, len(fit.times_s)), 3**0.5 * float(fit.trusted_m.min())
     for segment in dict.fromkeys(fit.segments):
         mine = np.array([k for k, name in enumerate(fit.segments) if name == segment])
@@ -156,15 +177,14 @@ def reordered(labelling: Labelling, refit: Refit) -> Labelling:
         likely = [k for k in np.argsort(misfits) if misfits[k] < _NEARER * as_labelled][:_LIKELY]
         if not likely:
             continue
-        tried = []
-        for k in likely:
-            exchanges = [
+        tried = [
+            [
                 Exchange(a, b, whole, as_labelled / float(misfits[k]))
                 for a, b in _transpositions(mine, orders[k])
             ]
-            some = refit(with_exchanges(fit, exchanges)[frames], fit.times_s[frames])
-            tried.append((misfit_m(some.distance_m()), exchanges))
-        _, found = min(tried, key=lambda one: one[0])
+            for k in likely
+        ]
+        _, found = best_fitting(fit, refit, tried)
         again = refitted(fit, refit, found)
         before, after = (misfit_m(one.distance_m()[:, mine]) for one in (fit, again))
         if after < _NEARER * before and misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):

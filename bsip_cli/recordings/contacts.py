@@ -93,6 +93,11 @@ class FootContacts:
         """Both feet have markers; a foot without any may stand anywhere."""
         return set(self.on_ground) == {"l", "r"}
 
+    @property
+    def surely_measured(self) -> np.ndarray:
+        """``measured`` where both feet are seen, (n_frames,) bool."""
+        return self.measured & self.has_both
+
 
 def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],

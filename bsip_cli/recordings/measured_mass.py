@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -234,6 +235,44 @@ def differing_plates(
         action += "are wrong while both plates bear the person"
         findings.append(Finding("plate_force", name, found, expected, action, "warning"))
     return findings
+
+
+def plate_gains(
+    plates: Mapping[str, Mapping[str, Sequence[Interval]]],
+    stated_kg: float | None,
+    most_percent: float,
+    alike_percent: float,
+    apart_percent: float,
+    static: Collection[str] = (),
+) -> dict[str, float]:
+    """How many times the load those plates read that surely have another gain than the others.
+
+    While it bears the person alone, such a plate shows a mass that is grossly apart from each of at
+    least two others, of plates and the stated one, and those are alike.
+
+    plates : intervals by plate and trial. most_percent : as for `measured_mass`. alike_percent,
+    apart_percent : what differs by less is alike, by more is grossly apart, beside the intervals.
+    """
+    every = {
+        name: measured_mass(some, most_percent, static=static) for name, some in plates.items()
+    }
+    shown = [one for one in every.values() if one.is_known]
+    if stated_kg is not None:
+        shown.append(MeasuredMass(stated_kg, alike_percent / _PERCENT / HALF_WIDTH, 0.0, 0))
+    gains = {}
+    for name, one in every.items():
+        others = [two for two in shown if two is not one]
+        if (
+            one.is_known
+            and len(others) > 1
+            and all(_are_apart(one, two, apart_percent) for two in others)
+            and not any(_are_apart(*pair, alike_percent) for pair in combinations(others, 2))
+        ):
+            usual = np.average(
+                [two.mass_kg for two in others], weights=[two.sd**-2 for two in others]
+            )
+            gains[name] = float(one.mass_kg / usual)
+    return gains
 
 
 def _are_apart(one: MeasuredMass, other: MeasuredMass, percent: float) -> bool:

@@ -11,7 +11,7 @@ whole strides, and in quiet stance.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -19,7 +19,13 @@ import numpy as np
 from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import runs
-from bsip_cli.recordings.contacts import low_pass, mean_path
+from bsip_cli.recordings.contacts import (
+    FootContacts,
+    PlateLoad,
+    bears_alone,
+    low_pass,
+    mean_path,
+)
 from bsip_cli.segments import SEGMENTS, without_side
 
 # A segment's share of the body's mass against the table: published regressions err by 10 to 25 %
@@ -204,6 +210,21 @@ def intervals_of(
             if (one := _stretch(force_z_N[part], motion, first, last, rate_hz)) is not None:
                 found.append(replace(one, start_s=one.start_s + part.start / rate_hz))
     return tuple(found)
+
+
+def intervals_alone(
+    markers_m: Mapping[str, np.ndarray],
+    feet: FootContacts,
+    plates: Sequence[PlateLoad],
+    rate_hz: float,
+) -> dict[str, tuple[Interval, ...]]:
+    """The same of each plate, while it bears the person alone."""
+    return {
+        one.name: intervals_of(
+            markers_m, one.force_z_N, feet.surely_measured & bears_alone(one, plates), rate_hz
+        )
+        for one in plates
+    }
 
 
 def _stretch(

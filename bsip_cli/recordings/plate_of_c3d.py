@@ -123,6 +123,9 @@ class C3dPlate:
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return float((self.description.corners_m @ self.rotation_world_lab.T)[:, 2].mean())
 
+    def scaled(self, times: float) -> C3dPlate:
+        return replace(self, measured=times * self.measured)
+
     def moved(self, change: np.ndarray, corners_only: bool = False) -> C3dPlate:
         """A mirrored plate's z points out of the floor."""
         corners = self.description.corners_m @ in_lab(change, self.rotation_world_lab).T

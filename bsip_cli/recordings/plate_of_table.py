@@ -121,6 +121,9 @@ class ForceOnPoint:
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return self.point_height * reading.point_scale
 
+    def scaled(self, times: float) -> ForceOnPoint:
+        return replace(self, force_N=times * self.force_N, moment=times * self.moment)
+
     def moved(self, change: np.ndarray, corners_only: bool = False) -> ForceOnPoint:
         """A moment turns the other way round in a mirror."""
         change = in_lab(change, self.rotation_world_lab)

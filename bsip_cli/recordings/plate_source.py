@@ -66,6 +66,9 @@ class PlateSource(Protocol):
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         """Height of the surface, world frame."""
 
+    def scaled(self, times: float) -> PlateSource:
+        """So many times the force and moment."""
+
     def moved(self, change: np.ndarray, corners_only: bool = False) -> PlateSource:
         """In other axes of the world (3, 3), turned or as if seen in a mirror; what channels hold
         is mirrored too unless ``corners_only``."""
@@ -113,6 +116,11 @@ class Opened:
         """With the forces of so much later, of a clock that came late."""
         by = round(delay_s * self.recording.analog_rate_hz)
         return replace(self, sources=tuple(one.later(by) for one in self.sources)) if by else self
+
+    def with_gains(self, gains: Mapping[str, float]) -> Opened:
+        """What plates of these names read over the gain of each."""
+        scaled = (one.scaled(1 / gains.get(one.name, 1.0)) for one in self.sources)
+        return replace(self, sources=tuple(scaled)) if gains else self
 
     def in_frame(self, change: FrameChange) -> Opened:
         """In other axes."""

@@ -13,18 +13,20 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.contacts import low_pass, reach_m_s2
+from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads, reach_m_s2
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import FORCE_UNITS_N, Written
-from bsip_cli.recordings.zero import steady_pull
+from bsip_cli.recordings.zero import steady_pull, without_zeros
 from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
@@ -161,6 +163,16 @@ def _without_missing(
     return [replace(plate, usable=plate.usable & alone) for plate in plates], findings
 
 
+def masses_alone(recording: Recording) -> dict[str, tuple[Interval, ...]]:
+    """What each plate shows of the person's mass while it bears the person alone."""
+    recording, *_ = without_zeros(recording)
+    markers, rate_hz = by_segment(recording.labels, recording.markers_m), recording.marker_rate_hz
+    loads = plate_loads(recording, wrench_at_marker_rate(recording))
+    own = {side: markers[name] for side in "lr" if (name := f"foot_{side}") in markers}
+    feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
+    return intervals_alone(markers, feet, loads, rate_hz)
+
+
 def findings_about(session: SessionReading) -> list[Finding]:
     """What was decided for all trials of a session alike."""
     plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
@@ -263,6 +275,15 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
+    if verdict.gain != 1.0:
+        found = f"while it bears the person alone, it reads {verdict.gain:.3g} times the weight "
+        found += "that the other plates and the stated mass agree on"
+        action = (
+            f"divided its forces and moments by {verdict.gain:.4g}, in all trials; correct its "
+        )
+        action += "gain or its range in the files"
+        expected = "one weight on every plate"
+        findings.append(Finding("plate_force", name, found, expected, action, "corrected"))
     if verdict.doubted:
         is_moment = verdict.doubted == "vertical moment"
         found = f"its {verdict.doubted}: {' or '.join(verdict.alternatives)}: these trials do not "

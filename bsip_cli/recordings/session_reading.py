@@ -57,7 +57,7 @@ class Verdict:
     where that differs. ``alternatives``: repairs that would each explain a plate, and that cannot
     be distinguished: it is left out, or what is ``doubted`` is said: its vertical moment where only
     that differs, its force where it is likeliest as the file says. ``repeats`` names the plates
-    whose copy or sum it is.
+    whose copy or sum it is. ``gain`` : how many times the load it reads.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
@@ -67,6 +67,7 @@ class Verdict:
     alternatives: tuple[str, ...] = ()
     doubted: Doubted = ""
     repeats: tuple[str, ...] = ()
+    gain: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,16 @@ class SessionReading:
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
+
+    def gains(self) -> dict[str, float]:
+        """Of plates that read another force than the load."""
+        return {name: one.gain for name, one in self.plates.items() if one.gain != 1.0}
+
+    def with_gains(self, gains: Mapping[str, float]) -> SessionReading:
+        plates = {
+            name: replace(one, gain=gains.get(name, 1.0)) for name, one in self.plates.items()
+        }
+        return replace(self, plates=plates)
 
 
 def reading_of_files(

@@ -59,6 +59,22 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
     return _zero_of(plate, unloaded, rate_hz)
 
 
+def without_zeros(
+    recording: Recording,
+) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
+    """The plates without what they read without load, and that, (6,) by plate: N and N m about the
+    world's origin."""
+    done, zeros = [], {}
+    for plate in recording.plates:
+        free = nobody_near(recording, plate)
+        zero = plate_zero(plate, recording.analog_rate_hz, surely_free=free)
+        done.append(subtract_zero(plate, zero))
+        if zero.is_known():
+            zeros[plate.name] = zero.offset.tolist()
+    zeroed = replace(recording, plates=tuple(plate for plate, _ in done))
+    return zeroed, [finding for _, finding in done], zeros
+
+
 def is_noticed(offset: np.ndarray) -> bool:
     """Whether what a plate reads without load, (6,), is more than rounding and noise."""
     return bool(np.abs(offset[:3]).max() > _NOTICED_N)

@@ -15,7 +15,6 @@ from bsip_cli.recordings.contacts import (
     ContactWindows,
     PlateLoad,
     agreeing_mass,
-    bears_alone,
     contact_windows,
     foot_contacts,
     plate_loads,
@@ -25,10 +24,15 @@ from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
 from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
 from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.momentum_mass import Interval, intervals_of, upright_frames
+from bsip_cli.recordings.momentum_mass import (
+    Interval,
+    intervals_alone,
+    intervals_of,
+    upright_frames,
+)
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
+from bsip_cli.recordings.zero import without_zeros
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
 from bsip_cli.stages.frames import WRENCH
@@ -39,7 +43,7 @@ from bsip_cli.stages.survey import opened, prefix_of, reading_of
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
-    recording = assemble(opened(unit, unit.own_trial, session.written), session)
+    recording = assemble(opened(unit, unit.own_trial, session.written, session.gains()), session)
     marker_set, about_set = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, prefix_of(unit)
@@ -58,7 +62,7 @@ def run(unit: Unit) -> None:
     findings = [*recording.findings, *about_set, *paired, *match.findings, *repeats]
     zeros: dict[str, list[float]] = {}
     if unit.config.ingest.zero_unloaded_plates:
-        recording, zeroed, zeros = _without_zero(recording)
+        recording, zeroed, zeros = without_zeros(recording)
         findings += zeroed
     segment = {marker.label: marker.segment for marker in marker_set.markers}
     segments = [segment[name] for name in names]
@@ -105,20 +109,6 @@ def run(unit: Unit) -> None:
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
-def _without_zero(recording: Recording) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
-    """The plates without what they read without load, and that, (6,) by plate: N and N m about the
-    world's origin."""
-    done, rate_hz = [], recording.analog_rate_hz
-    zeros = {}
-    for plate in recording.plates:
-        zero = plate_zero(plate, rate_hz, surely_free=nobody_near(recording, plate))
-        done.append(subtract_zero(plate, zero))
-        if zero.is_known():
-            zeros[plate.name] = zero.offset.tolist()
-    zeroed = replace(recording, plates=tuple(plate for plate, _ in done))
-    return zeroed, [finding for _, finding in done], zeros
-
-
 def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:
     """The set that is configured, or recognised from the labels, and how."""
     if unit.config.marker_set != "auto":
@@ -159,13 +149,9 @@ def _contacts(
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
     feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
-    shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
-    intervals = intervals_of(markers, feet.total_N, shown, rate_hz)
+    intervals = intervals_of(markers, feet.total_N, feet.surely_measured, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
-    alone = {
-        load.name: intervals_of(markers, load.force_z_N, shown & bears_alone(load, loads), rate_hz)
-        for load in loads
-    }
+    alone = intervals_alone(markers, feet, loads, rate_hz)
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
     about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:

@@ -5,7 +5,7 @@ Written as rows of ``readings``, and read back for each trial.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from functools import partial
 
@@ -16,10 +16,12 @@ from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
+from bsip_cli.recordings.measured_mass import plate_gains
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import Opened
-from bsip_cli.recordings.read import findings_about, open_recording
+from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files
 from bsip_cli.recordings.trial_samples import TrialSamples
@@ -31,6 +33,7 @@ from bsip_cli.study.study import Trial
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
 _OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others")
+NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
 
 
@@ -55,6 +58,9 @@ def run(unit: Unit) -> None:
         stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
         read = partial(_surveyed, unit, mine, limits)
         reading = reading_of_files(seen, read, *stated, limits)
+        if gains := _gains(unit, mine, reading):
+            read = partial(_surveyed, unit, mine, limits, gains=gains)
+            reading = reading_of_files(read(), read, *stated, limits).with_gains(gains)
         rows += rows_of(session or "", reading)
         for name, of_trials in facts.items():
             of_trials |= getattr(reading, name)
@@ -76,6 +82,33 @@ def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
         unit.say(about.sentence())
 
 
+def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict[str, float]:
+    """Of plates that surely read another force than the load."""
+    if sum(not (one.refusal or one.repeats) for one in reading.plates.values()) < 2:
+        return {}
+    shown: dict[str, dict[str, list[Interval]]] = {}
+    masses = [unit.person.mass_kg]
+    for trial in trials:
+        try:
+            recording = assemble(opened(unit, trial, reading.written), reading)
+        except BadDataError:  # its own turn will say why
+            continue
+        masses.append(recording.stated.mass_kg)
+        load_kg = unit.load_kg(trial)
+        for plate, intervals in masses_alone(recording).items():
+            own = [one.without(load_kg) for one in intervals]
+            shown.setdefault(plate, {})[trial.stem] = own
+    options = unit.config.ingest
+    return plate_gains(
+        shown,
+        next((kg for kg in masses if kg is not None), None),
+        options.mass_half_width_percent,
+        options.mass_tolerance_percent,
+        options.mass_gross_percent,
+        {trial.stem for trial in trials if trial.role == "static"},
+    )
+
+
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
     """One movement under two names would be held out from itself."""
     first: dict[str, Trial] = {}
@@ -93,17 +126,23 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
 
 
 def _surveyed(
-    unit: Unit, trials: Sequence[Trial], limits: GateLimits, written: Written = AS_WRITTEN
+    unit: Unit,
+    trials: Sequence[Trial],
+    limits: GateLimits,
+    written: Written = AS_WRITTEN,
+    gains: Mapping[str, float] = NO_GAINS,
 ) -> list[TrialSamples]:
     """Of the recordings that can be read."""
-    every = (_survey(unit, trial, limits, written) for trial in trials)
+    every = (_survey(unit, trial, limits, written, gains) for trial in trials)
     return [one for one in every if one is not None]
 
 
-def _survey(unit: Unit, trial: Trial, limits: GateLimits, written: Written) -> TrialSamples | None:
+def _survey(
+    unit: Unit, trial: Trial, limits: GateLimits, written: Written, gains: Mapping[str, float]
+) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
-        found = opened(unit, trial, written)
+        found = opened(unit, trial, written, gains)
     except BadDataError:
         return None
     seen = TrialSamples.of(found, limits)
@@ -120,10 +159,12 @@ def _survey(unit: Unit, trial: Trial, limits: GateLimits, written: Written) -> T
 # --- to rows and back -------------------------------------------------------------------------
 
 
-def opened(unit: Unit, trial: Trial, written: Written = AS_WRITTEN) -> Opened:
+def opened(
+    unit: Unit, trial: Trial, written: Written = AS_WRITTEN, gains: Mapping[str, float] = NO_GAINS
+) -> Opened:
     """A trial's recording, of the plates that count and of the person whose markers do."""
     found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
-    found = found.as_written(written)
+    found = found.as_written(written).with_gains(gains)
     if prefix := prefix_of(unit):
         recording = found.recording
         own = sorted(person_of(recording.labels, bones, prefix).names)
@@ -150,6 +191,7 @@ def _row(verdict: Verdict) -> dict:
     places = *(row.pop("centre_m") or [nothing] * 3), *(row.pop("half_size_m") or [nothing] * 2)
     row |= {"reversed_round": row.pop("mirrored"), "refusal": verdict.refusal}
     row |= dict(zip((*_CENTRE, *_HALF), places, strict=True)) | {"doubted": verdict.doubted}
+    row |= {"gain": verdict.gain}
     row |= {"rivals": "|".join(verdict.alternatives), "repeats": " ".join(verdict.repeats)}
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
     for when, found in (("before", verdict.before), ("after", verdict.after)):
@@ -172,7 +214,7 @@ def _verdict(row: dict) -> Verdict:
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
     others, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
-    said = {"refusal": row["refusal"], "doubted": row["doubted"]}
+    said = {name: row[name] for name in ("refusal", "doubted", "gain")}
     return Verdict(
         reading, before, after, alternatives=tuple(others), repeats=tuple(repeats), **said
     )

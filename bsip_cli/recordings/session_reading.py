@@ -116,6 +116,7 @@ def reading_of_files(
 
     stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
     """
+    surely = limits.corrected_percent / 100
     whose = of_other_trials([one.lengths for one in trials])
     if of_others := {trials[k].name: trials[other].name for k, other in whose.items()}:
 
@@ -132,10 +133,11 @@ def reading_of_files(
     if masses:
         usual = Stature.of_all([one.stature for one in trials])
         height_m = stated_m or (None if usual is None else usual.height_m)
-        if name := force_unit(float(np.median(masses)), stated_kg, height_m, gross_percent):
+        mass_kg = float(np.median(masses))
+        if name := force_unit(mass_kg, stated_kg, height_m, gross_percent, surely):
             written = Written(FORCE_UNITS_N[name])
             trials = read(written)
-    found, surely = session_reading(trials, limits), limits.corrected_percent / 100
+    found = session_reading(trials, limits)
     now, best = found.log_posterior, replace(found, written=written)
     most = float(np.log(surely / (1 - surely)))
     for pace, odds in likely_paces([one.lengths for one in trials]).items():

@@ -29,8 +29,10 @@ def lengths(*pairs: tuple[float, float]) -> list[Lengths | None]:
 
 @pytest.mark.parametrize("unit", SIZES)
 @pytest.mark.parametrize("stated_kg", [70.0, None])
-def test_the_unit_that_alone_makes_the_person(unit, stated_kg):
-    assert force_unit(70.0 * SIZES[unit], stated_kg, 1.75, 15.0) == unit
+@pytest.mark.parametrize("body_kg", [60.0, 85.0])  # body-mass indices of 20 and 28
+def test_the_unit_that_alone_makes_the_person(unit, stated_kg, body_kg):
+    stated_kg = stated_kg and body_kg
+    assert force_unit(body_kg * SIZES[unit], stated_kg, 1.75, 15.0, 0.95) == unit
 
 
 @pytest.mark.parametrize(
@@ -46,7 +48,7 @@ def test_the_unit_that_alone_makes_the_person(unit, stated_kg):
     ],
 )
 def test_a_unit_that_is_not_sure_is_not_taken(mass_kg, stated_kg, height_m):
-    assert force_unit(mass_kg, stated_kg, height_m, 15.0) == ""
+    assert force_unit(mass_kg, stated_kg, height_m, 15.0, 0.95) == ""
 
 
 def test_lengths_that_differ_by_one_factor_in_several_trials_are_a_pace():

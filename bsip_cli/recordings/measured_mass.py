@@ -243,7 +243,6 @@ def plate_gains(
     most_percent: float,
     alike_percent: float,
     apart_percent: float,
-    static: Collection[str] = (),
 ) -> dict[str, float]:
     """How many times the load those plates read that surely have another gain than the others.
 
@@ -253,9 +252,7 @@ def plate_gains(
     plates : intervals by plate and trial. most_percent : as for `measured_mass`. alike_percent,
     apart_percent : what differs by less is alike, by more is grossly apart, beside the intervals.
     """
-    every = {
-        name: measured_mass(some, most_percent, static=static) for name, some in plates.items()
-    }
+    every = {name: measured_mass(some, most_percent) for name, some in plates.items()}
     shown = [one for one in every.values() if one.is_known]
     if stated_kg is not None:
         shown.append(MeasuredMass(stated_kg, alike_percent / _PERCENT / HALF_WIDTH, 0.0, 0))

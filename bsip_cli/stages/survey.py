@@ -105,7 +105,6 @@ def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict
         options.mass_half_width_percent,
         options.mass_tolerance_percent,
         options.mass_gross_percent,
-        {trial.stem for trial in trials if trial.role == "static"},
     )
 
 

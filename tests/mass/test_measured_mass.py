@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
+from bsip_cli.recordings.measured_mass import (
+    differing_plates,
+    mass_finding,
+    measured_mass,
+    plate_gains,
+)
 from tests.mass.body import told
 
 
@@ -59,6 +64,30 @@ def test_a_mass_that_is_nobodys_is_said_with_the_likely_unit(mass_kg, unit):
     finding = mass_finding(measured_mass({"a": told(mass_kg)}, 10.0, 1.70), None, "")
     assert finding.level == "warning" and "a person of 1.70 m has 35 to 173" in finding.found
     assert unit in finding.found and ("likely" in finding.found) == bool(unit)
+
+
+@pytest.mark.parametrize(
+    ("masses_kg", "stated_kg", "gains"),
+    [
+        ((124.0, 62.0), 62.0, {"1": 2.0}),
+        ((62.0, 49.6), 62.5, {"2": 0.8}),
+        ((62.0, 31.0, 62.3), None, {"2": 0.5}),
+        ((124.0, 62.0), None, {}),  # one against one
+        ((124.0,), 62.0, {}),
+        ((62.0, 61.0), 136.0, {}),  # pounds are stated
+        ((124.0, 62.0), 75.0, {}),  # the two others do not agree
+        ((62.0, 66.0), 62.0, {}),  # too little for a wrong gain: a load, a rail
+    ],
+)
+def test_a_gain_is_taken_off_where_two_others_agree(masses_kg, stated_kg, gains):
+    plates = {str(k + 1): {"walk": told(kg)} for k, kg in enumerate(masses_kg)}
+    found = plate_gains(plates, stated_kg, 10.0, 2.0, 15.0)
+    assert found == pytest.approx(gains, rel=0.015)
+
+
+def test_a_plate_that_shows_different_masses_in_different_trials_has_no_gain():
+    plates = {"1": {"walk": told(124.0), "walk2": told(90.0)}, "2": {"walk": told(62.0)}}
+    assert plate_gains(plates, 62.0, 10.0, 2.0, 15.0) == {}
 
 
 @pytest.mark.parametrize(

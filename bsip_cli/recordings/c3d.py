@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,7 @@ def open_c3d(path: Path) -> Opened:
     plates, about_plates, about_samples = read_plates(content, unit_m, rotation)
     stated, about_person = stated_person(content.parameters)
     about = (*content.findings, *about_points, *about_plates, *scene.findings_about(up))
+    about_person += _recorded_on(content.group("TRIAL"))
     recording = Recording(
         path=path,
         marker_rate_hz=content.rate_hz,
@@ -68,6 +70,15 @@ def open_c3d(path: Path) -> Opened:
         stated=stated,
     )
     return Opened(recording, tuple(plates))
+
+
+def _recorded_on(trial: Group) -> tuple[Finding, ...]:
+    """TRIAL:DATE, where BTS writes year, month and day; nothing where that is no day."""
+    try:
+        day = date(*map(int, np.ravel(whole_numbers(trial, "DATE")))).isoformat()
+    except (TypeError, ValueError):
+        return ()
+    return (Finding("recorded_on", "", day, "", "said in the report", "info"),)
 
 
 def _up(

@@ -86,8 +86,8 @@ class Light(Block):
 
 @dataclass(frozen=True)
 class Bar(Block):
-    """A whole cut into pieces, whose shares [%] add up to 100; a share below zero makes the rest
-    larger and has no length."""
+    """A whole cut into pieces, whose shares [%] add up to 100; what has a share below zero cancels
+    a part of the others, and has no length."""
 
     title: str
     pieces: tuple[Piece, ...]
@@ -105,7 +105,7 @@ class Bar(Block):
 class Scale:
     """A number between what is good and what is too large, all in one unit; ``words`` say which it
     is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
-    arrow points. ``other``: the number by other parameters; empty for none."""
+    arrow points. ``other``: the same by other parameters; None where there are none."""
 
     title: str
     shown: str
@@ -116,7 +116,7 @@ class Scale:
     good: str
     limit: str
     is_beyond: bool = False
-    other: str = ""
+    other: Scale | None = None
 
 
 @dataclass(frozen=True)

@@ -11,24 +11,44 @@ import numpy as np
 from bsip_cli.report import blocks, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
-from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentence
+from bsip_cli.report.errors import (
+    BEFORE,
+    COP,
+    FORCE,
+    MARKERS,
+    PARAMETERS,
+    SOURCES,
+    Yardstick,
+    numbered_pieces,
+    overall_pieces,
+    use_sentence,
+)
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
     is_said,
     large_alone,
     large_finding,
+    largest_in,
     light_for,
     measured_of,
     must_wait,
     names_of,
     number_of_main_part,
+    numbered,
     use_lines,
     worst_of,
 )
-from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
-from bsip_cli.statistics.methods import RM
+from bsip_cli.report.records import (
+    HowMade,
+    ParticipantRecord,
+    TrialRecord,
+    clock_of,
+    flags_of,
+    signals_of,
+)
+from bsip_cli.report.words import TEXTS, abbreviations, capital, in_a_row, listing, number
+from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -38,18 +58,19 @@ _MOST = 2  # findings in full
 _FEW = 3  # findings, whose actions are all given
 _MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
+_MOST_FILES = 4  # that are named
 _POSES = 8  # among which the one is chosen that is shown
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
     light = light_for(record)
-    has_findings = record.causes or large_finding(record)
+    says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
     return (
         *portrait(record),
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
-        replace(light, text="") if has_findings and light.state == "large" else light,
+        replace(light, text="") if says_it else light,
         *_causes(record),
         *_sizes(record),
         *_sure(record, light),
@@ -64,7 +85,8 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
-    """Names and what is known: the person, the recordings, the software."""
+    """Names and what is known: the person, the recordings and their files, the parameters, the
+    report."""
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
     sex = f"{_SEXES[facts['sex']]}, " if facts["sex"] in _SEXES else ""
@@ -76,17 +98,33 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     times = {name: names.count(name) for name in names}
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
     short = abbreviations(names)
-    stems = tuple(f"{trial.stem}." for trial in record.trials)
-    files = sum(name.startswith(stems) for name in HowMade.of(record.origins).files)
-    said = [*([short] if short else []), count(files, "file")]
-    yield "Recordings", f"{listing(tasks)} ({'; '.join(said)})"
-    used = listing([trial.label for trial in record.identification_trials()])
-    yield "Identified from", used
+    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}; {_recorded(record)}"
+    yield "Files", _files(record)
+    used = listing([names_of(record)[t.stem] for t in record.identification_trials()], "nothing")
+    yield "Parameters", TEXTS["parameters"].format(trials=used)
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
-    yield "Software", f"bsip {', '.join(versions)}"
+    yield "Report", f"{record.made_on}, bsip {', '.join(versions)}"
     for name in ("mass", "height"):
         if note := str(record.facts[f"{name}_note"]):
             yield capital(name), f"{capital(note)}."
+
+
+def _recorded(record: ParticipantRecord) -> str:
+    """When, as the files say."""
+    tables = [trial.quality for trial in record.trials if trial.quality is not None]
+    days = sorted({day for t in tables for day in t.loc[t["check"] == "recorded_on", "found"]})
+    first_and_last = " to ".join(dict.fromkeys((*days[:1], *days[-1:])))
+    return f"recorded {first_and_last}" if days else "no date in the files"
+
+
+def _files(record: ParticipantRecord) -> str:
+    """Names of few, with what all begin with once; of many how many there are."""
+    stems, begin = tuple(f"{trial.stem}." for trial in record.trials), f"{record.id}_"
+    names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
+    if len(names) > _MOST_FILES:
+        kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
+        return f"{len(names)} ({begin}…{listing(kinds)})"
+    return listing([*names[:1], *(f"…{name.removeprefix(begin)}" for name in names[1:])])
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -150,10 +188,7 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:_MOST_KINDS]:
-        which = listing([str(k) for k in numbers])
-        if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-            which = f"{numbers[0]} to {numbers[-1]}"
-        yield f"{which}: {' / '.join(dict.fromkeys(titles))}"
+        yield f"{in_a_row(numbers)}: {listing([*dict.fromkeys(titles)], word='or')}"
     if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
         yield f"{rest} more"
 
@@ -186,28 +221,32 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """The yardsticks, and what makes the error: each says of which parameters it is."""
-    use, bar = record.use(), tuple(budget_bar(record))
-    table = {one.name: number(size) for one, size in measured_of(record, RM)} if bar else {}
-    scales = []
-    for one, size in measured_of(record):
-        other = table.get(one.name, number(size))
-        scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
-    named = use if large_finding(record) else METHODS[use]  # the finding says what it is
-    yield blocks.Heading(f"How large are the errors with {named}?")
+    """The yardsticks by the parameters to use and by the table's, and what makes these errors."""
+    use = record.use()
+    with_table = (one.scale(size) for one, size in measured_of(record, RM))
+    scales = [
+        one.scale(size, other if other.shown != one.scale(size).shown else None)
+        for (one, size), other in zip(measured_of(record), with_table, strict=True)
+    ]
+    which = f"? ● {use}, ○ {RM}, before identification" if use != RM else f" with {RM}?"
+    yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(SOURCES, "note")
-    yield from bar
+    yield from budget_bar(record)
 
 
 def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """What makes the error of the table's parameters, as one bar."""
+    """What makes the error of the table's parameters, as one bar, and how to read it."""
     if record.budget is None:
         return
-    if pieces := overall_pieces(record.budget, effects_in(record.causes)):
+    findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
+    if pieces := numbered_pieces(record.budget, findings):
         use = record.use()
-        other = f" of {METHODS[RM]}, not {use}" if use != RM else ", by cause"
-        yield blocks.Bar(f"What makes the squared error{other}", pieces)
+        by_om = " (which OM corrects)" if use == OM else ""
+        pieces = tuple(replace(p, label=p.label + by_om * (PARAMETERS in p.label)) for p in pieces)
+        yield blocks.Bar(f"What makes the {BEFORE if use != RM else 'squared error'}:", pieces)
+        if any(one.share < 0 for one in pieces):
+            yield blocks.Paragraph("Below 0 %: cancels a part of the others.", "note")
 
 
 # --- what to do ---------------------------------------------------------------------------------
@@ -226,9 +265,8 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    if not beyond(record) and (alone := large_alone(record)):
-        where = listing([names_of(record)[trial.stem] for trial in alone])
-        said.append(TEXTS["to_do"]["forces"].format(trial=where))
+    if not beyond(record):
+        said += [_look_for(record, *largest_in(record, trial)) for trial in large_alone(record)]
     if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine" and not said:
@@ -237,7 +275,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
     if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
-    return said[:_MOST_TO_DO]
+    return [*filter(None, said)][:_MOST_TO_DO]
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
@@ -247,10 +285,43 @@ def _look_at(record: ParticipantRecord) -> Iterator[str]:
         return
     is_finding = bool(large_finding(record)) or is_said(record)
     number_of_it = "Finding 1: " if is_finding else ""
-    texts = TEXTS["to_do"]
     for one, _ in beyond(record)[:1]:
         worst = worst_of(record, one)
         if one.name == MARKERS:
-            yield f"{number_of_it}{texts['markers']}"
-        elif worst is not None:
-            yield f"{number_of_it}{texts['forces'].format(trial=names_of(record)[worst.stem])}"
+            yield f"{number_of_it}{TEXTS['to_do']['markers']}"
+        elif worst is not None and (text := _look_for(record, worst, one)):
+            yield f"{number_of_it}{text}"
+
+
+_OF = {COP: ("cop_ap", "cop_ml"), FORCE: ("fz",)}  # components of the error budget
+_SIGNALS = {COP: ("cop_ap_m", "cop_ml_m"), FORCE: ("fz_N",)}
+
+
+def _look_for(record: ParticipantRecord, trial: TrialRecord, error: Yardstick) -> str:
+    """What makes the largest part of a recording's error and what helps; empty where that is a
+    finding; where it is not known, when the error is largest and what may be its cause."""
+    name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
+    budget, of = record.budget, (trial.stem, _OF[error.name])
+    if budget is not None and (parts := overall_pieces(budget, found, *of)):
+        main = max(parts, key=lambda one: one.share)
+        if {term.partition(":")[2] for term in main.terms} & found:
+            return ""
+        helps = [texts["helps"].get(kind, "") for kind in main.kinds]
+        if all(helps):
+            return texts["part"].format(
+                trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
+            )
+    at = _largest_at(trial, record.use(), _SIGNALS[error.name])
+    when = "" if at is None else f"; the error is largest at {number(at, 2)} s"
+    return texts["forces"].format(trial=name, when=when)
+
+
+def _largest_at(trial: TrialRecord, method: str, columns: Sequence[str]) -> float | None:
+    """When [s] the simulated signals are farthest from the measured ones; None if not known."""
+    table = trial.reconstruction
+    if table is None or method not in set(table["method"]):
+        return None
+    signals = [signals_of(table, column) for column in columns]
+    off = np.sum([(one[method] - one[MEASURED]) ** 2 for one in signals], axis=0)
+    off = np.where(flags_of(table, "valid") & np.isfinite(off), off, 0.0)
+    return float(clock_of(table)[np.argmax(off)]) if off.any() else None

@@ -65,11 +65,25 @@ def signed(value: float, digits: int = 0) -> str:
     return f"+{text}" if text != MISSING and value > 0 and float(f"{value:.{digits}f}") else text
 
 
-def listing(items: Sequence[str], empty: str = "none") -> str:
+def listing(items: Sequence[str], empty: str = "none", word: str = "and") -> str:
     """``a, b and c``."""
     if not items:
         return empty
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} {word} {items[-1]}"
+
+
+def findings(numbers: Sequence[int]) -> str:
+    """``finding 2``, ``findings 1 and 3`` or ``findings 5 to 8``; empty without any."""
+    if not numbers:
+        return ""
+    return f"finding{'s' if len(numbers) > 1 else ''} {in_a_row(numbers)}"
+
+
+def in_a_row(numbers: Sequence[int]) -> str:
+    """``2``, ``1 and 3`` or ``5 to 8``, of numbers that rise."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    return listing([str(k) for k in numbers])
 
 
 def count(n: int, singular: str, plural: str = "") -> str:

@@ -142,17 +142,16 @@ def use_sentence(
     most = str(first["use"]) if is_known else TEXTS["methods_in_full"][str(first["use"])]
     if others:
         most = f"{brief(str(first['use']))} for all other movements"
-    said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
-    rare = identification[identification["rare"].astype(bool)]
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
-    ]
+    rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
+    compared = _compared(first, together=bool(others), is_rare=OM in rare)
+    said = f"{use} {', and '.join([*others, most])}{compared}."
+    warned = [f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare]
     return " ".join([said, *warned])
 
 
-def _compared(first: pd.Series, together: bool) -> str:
+def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
     """What the choice rests on, to go on with after the method's name; ``together``: over movements
-    of which some ask for another method."""
+    of which some ask for another method; ``is_rare``: OM is ruled out by its body."""
     if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
         return ": no recording is left to judge OM by"
     om, scaled, over_scaled = (
@@ -169,13 +168,12 @@ def _compared(first: pd.Series, together: bool) -> str:
         return (
             f": {where}its error is {scaled} than RM's, and OM's error {over_scaled} than RM+mass's"
         )
-    times = "RM+mass's (RM times one number)"
-    said = f"{om} than RM's and {times}"
+    said = f"{om} than RM's and RM+mass's"
     if om != over_scaled:
-        said = f"{om} than RM's, {over_scaled} than {times}"
-    if first["use"] == RM:
+        said = f"{om} than RM's, {over_scaled} than RM+mass's"
+    if first["use"] == RM and not is_rare:
         return f": OM is not clearly better; {where}its error is {said}"
-    whose = "OM's" if together else "its"
+    whose = "its" if first["use"] == OM and not together else "OM's"
     return f": {where}{whose} error is {said}"
 
 
@@ -199,7 +197,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Good: Hansen 2017; large: Hicks 2015; markers: OpenSim."
+SOURCES = "Marks: good (Hansen 2017), large (Hicks 2015; markers: OpenSim)."
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
@@ -247,8 +245,8 @@ class Yardstick:
             min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"good to {self.good:.2g}",
-            f"large from {number(self.limit, 0)}",
+            f"{self.good:.2g}",
+            number(self.limit, 0),
             bool(value > end),
             other,
         )
@@ -353,13 +351,16 @@ def numbered_pieces(
             term, word = (own, "") if own in known else (_PART_OF.get(effect, own), "with ")
             of.setdefault(term, (word, set()))[1].add(number_of)
     pieces = overall_pieces(budget, {effect for effects in found.values() for effect in effects})
-    return tuple(replace(one, label=f"{one.label}{_belongs(one, of)}") for one in pieces)
+    return tuple(replace(one, label=f"{one.label}{_remarks(one, of)}") for one in pieces)
 
 
-def _belongs(piece: Piece, of: Mapping[str, tuple[str, set[int]]]) -> str:
+def _remarks(piece: Piece, of: Mapping[str, tuple[str, set[int]]]) -> str:
+    """The findings that it belongs to, and what a share below zero means."""
     mine = [of[term] for term in piece.terms if term in of]
     numbers = sorted({number_of for _, some in mine for number_of in some})
-    return f" ({mine[0][0]}{findings(numbers)})" if mine else ""
+    said = [f"{mine[0][0]}{findings(numbers)}"] if mine else []
+    said += ["cancels some"] if piece.share < 0 else []
+    return f" ({'; '.join(said)})" if said else ""
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:

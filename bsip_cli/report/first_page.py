@@ -47,7 +47,7 @@ from bsip_cli.report.records import (
     flags_of,
     signals_of,
 )
-from bsip_cli.report.words import TEXTS, abbreviations, capital, in_a_row, listing, number
+from bsip_cli.report.words import TEXTS, abbreviations, capital, count, in_a_row, listing, number
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ _MOST = 2  # findings in full
 _FEW = 3  # findings, whose actions are all given
 _MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
-_MOST_FILES = 4  # that are named
+_MOST_FILES = 2  # that are named
 _POSES = 8  # among which the one is chosen that is shown
 
 
@@ -114,17 +114,17 @@ def _recorded(record: ParticipantRecord) -> str:
     tables = [trial.quality for trial in record.trials if trial.quality is not None]
     days = sorted({day for t in tables for day in t.loc[t["check"] == "recorded_on", "found"]})
     first_and_last = " to ".join(dict.fromkeys((*days[:1], *days[-1:])))
-    return f"recorded {first_and_last}" if days else "no date in the files"
+    return f"recorded {first_and_last}" if days else "date unknown"
 
 
 def _files(record: ParticipantRecord) -> str:
-    """Names of few, with what all begin with once; of many how many there are."""
+    """Names of few; of many how many there are, and how they begin and end."""
     stems, begin = tuple(f"{trial.stem}." for trial in record.trials), f"{record.id}_"
     names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
     if len(names) > _MOST_FILES:
         kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
         return f"{len(names)} ({begin}…{listing(kinds)})"
-    return listing([*names[:1], *(f"…{name.removeprefix(begin)}" for name in names[1:])])
+    return listing(names)
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -188,7 +188,9 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:_MOST_KINDS]:
-        yield f"{in_a_row(numbers)}: {listing([*dict.fromkeys(titles)], word='or')}"
+        name, *others = dict.fromkeys(titles)
+        more = f", or {count(len(others), 'other')}" if others else ""
+        yield f"{in_a_row(numbers)}: {name}{more}"
     if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
         yield f"{rest} more"
 
@@ -207,8 +209,8 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     said = []
     if light.state == "large":
         known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-        said.append(f"The large error is certain{'' if known else ', its cause unknown'}.")
-        unseen = unseen if known else verdict.MAY_HIDE
+        said.append(TEXTS["sure"]["known" if known else "unknown"])
+        unseen = unseen if known else ""
     elif not record.causes:
         said.append("No fault is more probable than not.")
     said.append(unseen)
@@ -228,7 +230,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
         one.scale(size, other if other.shown != one.scale(size).shown else None)
         for (one, size), other in zip(measured_of(record), with_table, strict=True)
     ]
-    which = f"? ● {use}, ○ {RM}, before identification" if use != RM else f" with {RM}?"
+    which = f"? ● {use}, ○ {RM}" if use != RM else f" with {RM}?"
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(SOURCES, "note")
@@ -245,8 +247,6 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         by_om = " (which OM corrects)" if use == OM else ""
         pieces = tuple(replace(p, label=p.label + by_om * (PARAMETERS in p.label)) for p in pieces)
         yield blocks.Bar(f"What makes the {BEFORE if use != RM else 'squared error'}:", pieces)
-        if any(one.share < 0 for one in pieces):
-            yield blocks.Paragraph("Below 0 %: cancels a part of the others.", "note")
 
 
 # --- what to do ---------------------------------------------------------------------------------
@@ -312,7 +312,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: Yardstick) -
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
     at = _largest_at(trial, record.use(), _SIGNALS[error.name])
-    when = "" if at is None else f"; the error is largest at {number(at, 2)} s"
+    when = "" if at is None else f" (worst: {number(at, 2)} s)"
     return texts["forces"].format(trial=name, when=when)
 
 

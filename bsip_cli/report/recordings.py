@@ -24,7 +24,6 @@ from bsip_cli.report.errors import (
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.words import (
-    METHODS,
     TEXTS,
     findings,
     listing,
@@ -127,8 +126,10 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     found = beyond(record)
     if not found or is_said(record) or light_for(record).state != "large":
         return ()
-    sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
-    said = f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
+    errors = [one.short() for one, _ in found]  # of several the yardsticks have the sizes
+    if len(found) == 1:
+        errors[0] += f" {number(found[0][1])} {found[0][0].brief_unit()}"
+    said = f"Large error with {record.use()}: {listing(errors)}"
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"

@@ -208,7 +208,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
         return f"{title}: {one.words.short}, {where}; {one.words.against}."
     said = [one.against_usual(), f"; {at_joints}" if at_joints else ""]
     said += [f"; probability {sure}" if sure else ""]
-    what = one.in_words(remarks=False).removeprefix("of unknown cause: ")
+    what = one.in_words(brief=True).removeprefix("of unknown cause: ")
     line = f"{title}: {what}, {where}{''.join(said)}."
     return f"{line} {one.which_size(short=True)}".rstrip()
 

@@ -65,11 +65,11 @@ def signed(value: float, digits: int = 0) -> str:
     return f"+{text}" if text != MISSING and value > 0 and float(f"{value:.{digits}f}") else text
 
 
-def listing(items: Sequence[str], empty: str = "none", word: str = "and") -> str:
+def listing(items: Sequence[str], empty: str = "none") -> str:
     """``a, b and c``."""
     if not items:
         return empty
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} {word} {items[-1]}"
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
 def findings(numbers: Sequence[int]) -> str:

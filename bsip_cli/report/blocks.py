@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -247,6 +248,13 @@ def render(document: Document) -> str:
     return environment.get_template("report.html.j2").render(
         document=document, style=style, files=FILES
     )
+
+
+def words_in(blocks: Iterable[Block]) -> int:
+    """Of a first page without its title, as a reader sees them."""
+    page = render(Document("", "", tuple(blocks), ()))
+    front = page.partition('<main id="front">')[2].partition("</main>")[0]
+    return len(unescape(re.sub(r"<[^>]+>", " ", front)).split())
 
 
 def _cleaned(value: object) -> object:

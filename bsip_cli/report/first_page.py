@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
+_MOST_WORDS = 390  # with the title 400
 _MOST = 2  # findings in full
 _FEW = 3  # findings, whose actions are all given
 _MOST_KINDS = 4  # of findings that are named only
@@ -63,15 +64,24 @@ _POSES = 8  # among which the one is chosen that is shown
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
-    """The blocks of the first page, in the order in which a reader asks."""
+    """The blocks of the first page, in the order in which a reader asks; so many findings in full
+    that a reader has the time."""
+    for most in range(_MOST, 0, -1):
+        page = tuple(_in_order(record, most))
+        if blocks.words_in(page) <= _MOST_WORDS:
+            break
+    return *portrait(record), *page
+
+
+def _in_order(record: ParticipantRecord, most: int) -> Iterator[blocks.Block]:
+    """``most``: findings in full."""
     light = light_for(record)
     says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
-    return (
-        *portrait(record),
+    yield from (
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
-        *_causes(record),
+        *_causes(record, most),
         *_sizes(record),
         *_sure(record, light),
         blocks.Heading("What may be used?"),
@@ -80,7 +90,7 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
             use_sentence(record.choice, record.identification, must_wait(record), is_known=True)
         ),
         blocks.Heading("What to do next"),
-        blocks.Bullets(tuple(to_do(record, light))),
+        blocks.Bullets(tuple(to_do(record, light, most))),
     )
 
 
@@ -123,7 +133,7 @@ def _files(record: ParticipantRecord) -> str:
     names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
     if len(names) > _MOST_FILES:
         kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
-        return f"{len(names)} ({begin}…{listing(kinds)})"
+        return f"{len(names)} ({begin}*{listing(kinds)})"
     return listing(names)
 
 
@@ -157,13 +167,13 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
+def _causes(record: ParticipantRecord, most: int) -> Iterator[blocks.Block]:
     """A line per finding, the most important first; of those that have no room what they are."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
     peaks, large = all_peaks(record.trials), large_finding(record)
-    shown = _causes_shown(record)
+    shown = _causes_shown(record, most)
     lines = [
         verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
         for cause in shown
@@ -195,9 +205,9 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         yield f"{rest} more"
 
 
-def _causes_shown(record: ParticipantRecord) -> tuple[Sequence[Candidate], ...]:
+def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
     """Those of which the page says all."""
-    return record.causes[: _MOST - len(large_finding(record))]
+    return record.causes[: most - len(large_finding(record))]
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -252,9 +262,9 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
 # --- what to do ---------------------------------------------------------------------------------
 
 
-def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
+def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str]:
     """At most three things."""
-    causes, first = _causes_shown(record), 1 + len(large_finding(record))
+    causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
     few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record)

@@ -54,34 +54,33 @@ if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST_WORDS = 390  # with the title 400
-_MOST = 2  # findings in full
+_MOST_WORDS = 393  # with the title 400
+_FINDINGS = ((2, 4), (2, 2), (1, 2))  # in full, and kinds that are named only
 _FEW = 3  # findings, whose actions are all given
-_MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
 _MOST_FILES = 2  # that are named
 _POSES = 8  # among which the one is chosen that is shown
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
-    """The blocks of the first page, in the order in which a reader asks; so many findings in full
-    that a reader has the time."""
-    for most in range(_MOST, 0, -1):
-        page = tuple(_in_order(record, most))
+    """The blocks of the first page, in the order in which a reader asks; as many findings as there
+    is room for."""
+    for most, named in _FINDINGS:
+        page = tuple(_in_order(record, most, named))
         if blocks.words_in(page) <= _MOST_WORDS:
             break
     return *portrait(record), *page
 
 
-def _in_order(record: ParticipantRecord, most: int) -> Iterator[blocks.Block]:
-    """``most``: findings in full."""
+def _in_order(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
+    """``most``: findings in full; ``named``: kinds of findings of which only the name is given."""
     light = light_for(record)
     says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
     yield from (
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
-        *_causes(record, most),
+        *_causes(record, most, named),
         *_sizes(record),
         *_sure(record, light),
         blocks.Heading("What may be used?"),
@@ -167,7 +166,7 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord, most: int) -> Iterator[blocks.Block]:
+def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
     """A line per finding, the most important first; of those that have no room what they are."""
     if record.diagnosis is None or record.detection is None:
         return
@@ -183,10 +182,10 @@ def _causes(record: ParticipantRecord, most: int) -> Iterator[blocks.Block]:
     if more := record.causes[len(shown) :]:
         address = (("More below", f"#{verdict.ALL_FAULTS}"),)
         first = 1 + len(large) + len(shown)
-        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first))}.")
+        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first, named))}.")
 
 
-def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str]:
+def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> Iterator[str]:
     """``3 and 5: marker not in its place``; findings of which one may be the other count together."""
     groups: list[tuple[list[int], list[str]]] = []
     for k, cause in enumerate(causes, first):
@@ -197,11 +196,11 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         groups = [group for group in groups if group not in mine]
         groups.append((sorted(merged), titles))
     groups.sort()
-    for numbers, titles in groups[:_MOST_KINDS]:
+    for numbers, titles in groups[:named]:
         name, *others = dict.fromkeys(titles)
         more = f", or {count(len(others), 'other')}" if others else ""
         yield f"{in_a_row(numbers)}: {name}{more}"
-    if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
+    if rest := sum(len(numbers) for numbers, _ in groups[named:]):
         yield f"{rest} more"
 
 

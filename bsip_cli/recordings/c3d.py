@@ -42,6 +42,7 @@ _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit al
 _USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
 _SAME_PLACE_M = 1e-3  # as precise as corners are written
 _PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, that can be distinguished
+_FIRST_YEAR = 1987  # of the format
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -75,10 +76,11 @@ def open_c3d(path: Path) -> Opened:
 def _recorded_on(trial: Group) -> tuple[Finding, ...]:
     """TRIAL:DATE, where BTS writes year, month and day; nothing where that is no day."""
     try:
-        day = date(*map(int, np.ravel(whole_numbers(trial, "DATE")))).isoformat()
+        day = date(*map(int, np.ravel(whole_numbers(trial, "DATE"))))
     except (TypeError, ValueError):
         return ()
-    return (Finding("recorded_on", "", day, "", "said in the report", "info"),)
+    about = Finding("recorded_on", "", day.isoformat(), "", "said in the report", "info")
+    return (about,) if day.year >= _FIRST_YEAR else ()
 
 
 def _up(

@@ -119,9 +119,10 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
 
 
 def _recorded(record: ParticipantRecord) -> str:
-    """When, as the files say."""
+    """When, as the study or else its files say."""
     tables = [trial.quality for trial in record.trials if trial.quality is not None]
-    days = sorted({day for t in tables for day in t.loc[t["check"] == "recorded_on", "found"]})
+    said = [day for t in tables for day in t.loc[t["check"] == "recorded_on", "found"]]
+    days = sorted(record.recorded_on or said)
     first_and_last = " to ".join(dict.fromkeys((*days[:1], *days[-1:])))
     return f"recorded {first_and_last}" if days else "date unknown"
 

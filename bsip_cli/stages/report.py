@@ -74,6 +74,11 @@ def record_of(unit: Unit) -> ParticipantRecord:
         origins=_origins(unit, usable),
         defaults=unit.shipped_options(),
         made_on=date.today().isoformat(),
+        recorded_on=tuple(
+            day
+            for name, day in unit.config.laboratory.recorded_on.items()
+            if name.partition("_ses-")[0] == unit.person.id
+        ),
         loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),

@@ -254,8 +254,8 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
     if pieces := numbered_pieces(record.budget, findings):
         use = record.use()
-        by_om = " (which OM corrects)" if use == OM else ""
-        pieces = tuple(replace(p, label=p.label + by_om * (PARAMETERS in p.label)) for p in pieces)
+        known = f"{PARAMETERS} (OM corrects these)" if use == OM else PARAMETERS
+        pieces = tuple(replace(p, label=p.label.replace(PARAMETERS, known)) for p in pieces)
         yield blocks.Bar(f"What makes the {BEFORE if use != RM else 'squared error'}:", pieces)
 
 

@@ -141,13 +141,13 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
     assert "How large are the errors? ● OM, ○ RM" in first
     assert "What makes the squared error before identification:" in first
-    assert "the table's segment parameters (which OM corrects) 70 %" in first
+    assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
     assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
     assert (
         "Use RM for now: OM comes from sequence, not usable as recorded. Correct it or choose "
-        "another (roles in study.toml) and run again. Then use RM for basketball, where OM is not "
+        "another (study.toml: roles) and run again. Then use RM for basketball, where OM is not "
         "clearly better, and OM for all other movements: in both other recordings OM's error is "
         "34 to 46 % smaller than RM's," in first
     )

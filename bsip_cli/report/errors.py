@@ -301,6 +301,7 @@ REST = "all others"
 UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
+_UNSURE = "too unsure for a finding"
 _LAST = ("noise", UNKNOWN)
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
@@ -351,16 +352,18 @@ def numbered_pieces(
             term, word = (own, "") if own in known else (_PART_OF.get(effect, own), "with ")
             of.setdefault(term, (word, set()))[1].add(number_of)
     pieces = overall_pieces(budget, {effect for effects in found.values() for effect in effects})
-    return tuple(replace(one, label=f"{one.label}{_remarks(one, of)}") for one in pieces)
+    return tuple(replace(one, label=_with_remarks(one, of)) for one in pieces)
 
 
-def _remarks(piece: Piece, of: Mapping[str, tuple[str, set[int]]]) -> str:
-    """The findings that it belongs to, and what a share below zero means."""
+def _with_remarks(piece: Piece, of: Mapping[str, tuple[str, set[int]]]) -> str:
+    """Its label with the findings that it belongs to, and what a share below zero means."""
+    label = piece.label.removesuffix(f" ({_UNSURE})")
+    said = [_UNSURE] if label != piece.label else []
     mine = [of[term] for term in piece.terms if term in of]
     numbers = sorted({number_of for _, some in mine for number_of in some})
-    said = [f"{mine[0][0]}{findings(numbers)}"] if mine else []
+    said += [f"{mine[0][0]}{findings(numbers)}"] if mine else []
     said += ["cancels some"] if piece.share < 0 else []
-    return f" ({'; '.join(said)})" if said else ""
+    return f"{label} ({'; '.join(said)})" if said else label
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
@@ -420,7 +423,7 @@ def term_words(term: str) -> str:
 def _label(terms: Sequence[str], found: Collection[str]) -> str:
     """A fault that is no finding has only the share that it may have."""
     faults = {term.removeprefix(_FAULT) for term in terms if term.startswith(_FAULT)}
-    unsure = ", too unsure for a finding" if faults and not faults & {*found} else ""
+    unsure = f" ({_UNSURE})" if faults and not faults & {*found} else ""
     return " or ".join(dict.fromkeys(map(term_words, terms))) + unsure
 
 

@@ -233,7 +233,7 @@ def test_what_makes_the_largest_part_in_a_recording_says_what_helps(record):
     assert "error of unknown cause" not in first_to_do("unknown")
     assert first_to_do("unknown").startswith("Finding 1: In basketball look for feet or hands")
     assert first_to_do("fault:plate_rotation").startswith("Finding 2: Correct the forces")
-    assert "forces and markers out of step, too unsure for a finding may make" in first_to_do(
+    assert "forces and markers out of step (too unsure for a finding) may make" in first_to_do(
         "fault:sync_offset"
     )
 

@@ -344,26 +344,25 @@ def numbered_pieces(
 ) -> tuple[Piece, ...]:
     """The same, each with the numbers of the findings that it belongs to; ``found``: the effects
     in each finding, by its number."""
-    known = set(budget["term"])
-    of: dict[str, tuple[str, set[int]]] = {}
-    for number_of, effects in found.items():
-        for effect in effects:
-            own = f"{_FAULT}{effect}"
-            term, word = (own, "") if own in known else (_PART_OF.get(effect, own), "with ")
-            of.setdefault(term, (word, set()))[1].add(number_of)
-    pieces = overall_pieces(budget, {effect for effects in found.values() for effect in effects})
-    return tuple(replace(one, label=_with_remarks(one, of)) for one in pieces)
+    known = {*budget["term"]}
+    terms = {
+        k: {own if (own := f"{_FAULT}{x}") in known else _PART_OF.get(x, own) for x in effects}
+        for k, effects in found.items()
+    }
+    pieces = overall_pieces(budget, {one for effects in found.values() for one in effects})
+    numbers = ([k for k, mine in terms.items() if mine & {*one.terms}] for one in pieces)
+    return tuple(map(_with_remarks, pieces, numbers))
 
 
-def _with_remarks(piece: Piece, of: Mapping[str, tuple[str, set[int]]]) -> str:
-    """Its label with the findings that it belongs to, and what a share below zero means."""
+def _with_remarks(piece: Piece, numbers: Sequence[int]) -> Piece:
+    """With the findings in its label, and with what a share below zero means."""
     label = piece.label.removesuffix(f" ({_UNSURE})")
     said = [_UNSURE] if label != piece.label else []
-    mine = [of[term] for term in piece.terms if term in of]
-    numbers = sorted({number_of for _, some in mine for number_of in some})
-    said += [f"{mine[0][0]}{findings(numbers)}"] if mine else []
+    if numbers:
+        is_fault = cause_colours.FAULT in piece.kinds
+        said.append(f"{'' if is_fault else 'with '}{findings(numbers)}")
     said += ["cancels some"] if piece.share < 0 else []
-    return f"{label} ({'; '.join(said)})" if said else label
+    return replace(piece, label=f"{label} ({'; '.join(said)})") if said else piece
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:

@@ -8,21 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report import blocks, verdict
+from bsip_cli.report import blocks, errors, records, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
-from bsip_cli.report.errors import (
-    BEFORE,
-    COP,
-    FORCE,
-    MARKERS,
-    PARAMETERS,
-    SOURCES,
-    Yardstick,
-    numbered_pieces,
-    overall_pieces,
-    use_sentence,
-)
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
@@ -39,14 +27,7 @@ from bsip_cli.report.recordings import (
     use_lines,
     worst_of,
 )
-from bsip_cli.report.records import (
-    HowMade,
-    ParticipantRecord,
-    TrialRecord,
-    clock_of,
-    flags_of,
-    signals_of,
-)
+from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
 from bsip_cli.report.words import TEXTS, abbreviations, capital, count, in_a_row, listing, number
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
@@ -86,7 +67,9 @@ def _in_order(record: ParticipantRecord, most: int, named: int) -> Iterator[bloc
         blocks.Heading("What may be used?"),
         blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
-            use_sentence(record.choice, record.identification, must_wait(record), is_known=True)
+            errors.use_sentence(
+                record.choice, record.identification, must_wait(record), is_known=True
+            )
         ),
         blocks.Heading("What to do next"),
         blocks.Bullets(tuple(to_do(record, light, most))),
@@ -243,7 +226,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     which = f"? ● {use}, ○ {RM}" if use != RM else f" with {RM}?"
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
-    yield blocks.Paragraph(SOURCES, "note")
+    yield blocks.Paragraph(errors.SOURCES, "note")
     yield from budget_bar(record)
 
 
@@ -252,11 +235,13 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
-    if pieces := numbered_pieces(record.budget, findings):
+    if pieces := errors.numbered_pieces(record.budget, findings):
         use = record.use()
-        known = f"{PARAMETERS} (OM corrects these)" if use == OM else PARAMETERS
-        pieces = tuple(replace(p, label=p.label.replace(PARAMETERS, known)) for p in pieces)
-        yield blocks.Bar(f"What makes the {BEFORE if use != RM else 'squared error'}:", pieces)
+        known = f"{errors.PARAMETERS} (OM corrects these)" if use == OM else errors.PARAMETERS
+        pieces = tuple(replace(p, label=p.label.replace(errors.PARAMETERS, known)) for p in pieces)
+        yield blocks.Bar(
+            f"What makes the {errors.BEFORE if use != RM else 'squared error'}:", pieces
+        )
 
 
 # --- what to do ---------------------------------------------------------------------------------
@@ -276,7 +261,8 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
     if not beyond(record):
-        said += [_look_for(record, *largest_in(record, trial)) for trial in large_alone(record)]
+        alone = (_look_for(record, *largest_in(record, one)) for one in large_alone(record))
+        said += filter(None, alone)
     if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine" and not said:
@@ -285,7 +271,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
     if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
-    return [*filter(None, said)][:_MOST_TO_DO]
+    return said[:_MOST_TO_DO]
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
@@ -297,22 +283,22 @@ def _look_at(record: ParticipantRecord) -> Iterator[str]:
     number_of_it = "Finding 1: " if is_finding else ""
     for one, _ in beyond(record)[:1]:
         worst = worst_of(record, one)
-        if one.name == MARKERS:
+        if one.name == errors.MARKERS:
             yield f"{number_of_it}{TEXTS['to_do']['markers']}"
         elif worst is not None and (text := _look_for(record, worst, one)):
             yield f"{number_of_it}{text}"
 
 
-_OF = {COP: ("cop_ap", "cop_ml"), FORCE: ("fz",)}  # components of the error budget
-_SIGNALS = {COP: ("cop_ap_m", "cop_ml_m"), FORCE: ("fz_N",)}
+_OF = {errors.COP: ("cop_ap", "cop_ml"), errors.FORCE: ("fz",)}  # components of the error budget
+_SIGNALS = {errors.COP: ("cop_ap_m", "cop_ml_m"), errors.FORCE: ("fz_N",)}
 
 
-def _look_for(record: ParticipantRecord, trial: TrialRecord, error: Yardstick) -> str:
+def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yardstick) -> str:
     """What makes the largest part of a recording's error and what helps; empty where that is a
     finding; where it is not known, when the error is largest and what may be its cause."""
     name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
     budget, of = record.budget, (trial.stem, _OF[error.name])
-    if budget is not None and (parts := overall_pieces(budget, found, *of)):
+    if budget is not None and (parts := errors.overall_pieces(budget, found, *of)):
         main = max(parts, key=lambda one: one.share)
         if {term.partition(":")[2] for term in main.terms} & found:
             return ""
@@ -331,7 +317,7 @@ def _largest_at(trial: TrialRecord, method: str, columns: Sequence[str]) -> floa
     table = trial.reconstruction
     if table is None or method not in set(table["method"]):
         return None
-    signals = [signals_of(table, column) for column in columns]
+    signals = [records.signals_of(table, column) for column in columns]
     off = np.sum([(one[method] - one[MEASURED]) ** 2 for one in signals], axis=0)
-    off = np.where(flags_of(table, "valid") & np.isfinite(off), off, 0.0)
-    return float(clock_of(table)[np.argmax(off)]) if off.any() else None
+    off = np.where(records.flags_of(table, "valid") & np.isfinite(off), off, 0.0)
+    return float(records.clock_of(table)[np.argmax(off)]) if off.any() else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -170,7 +171,8 @@ def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks
 
 
 def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> Iterator[str]:
-    """``3 and 5: marker not in its place``; findings of which one may be the other count together."""
+    """``3 and 5: marker not in its place``; findings of which one may be the other count together,
+    by the name that most of them may have."""
     groups: list[tuple[list[int], list[str]]] = []
     for k, cause in enumerate(causes, first):
         titles = [effect_title(one.effect) for one in cause]
@@ -181,7 +183,7 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:named]:
-        name, *others = dict.fromkeys(titles)
+        (name, _), *others = Counter(titles).most_common()
         more = f", or {count(len(others), 'other')}" if others else ""
         yield f"{in_a_row(numbers)}: {name}{more}"
     if rest := sum(len(numbers) for numbers, _ in groups[named:]):
@@ -308,7 +310,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
     at = _largest_at(trial, record.use(), _SIGNALS[error.name])
-    when = "" if at is None else f" (worst: {number(at, 2)} s)"
+    when = "" if at is None else f" (error worst at {number(at, 2)} s)"
     return texts["forces"].format(trial=name, when=when)
 
 

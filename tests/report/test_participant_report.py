@@ -146,8 +146,8 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "Markers from model: 6.7 mm (good)" in first
     assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
     assert (
-        "Use RM for now: OM comes from sequence, not usable as recorded. Correct it or choose "
-        "another (study.toml: roles) and run again. Then use RM for basketball, where OM is not "
+        "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
+        "another (study.toml: roles); run again. Then use RM for basketball, where OM is not "
         "clearly better, and OM for all other movements: in both other recordings OM's error is "
         "34 to 46 % smaller than RM's," in first
     )
@@ -249,7 +249,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     *_, to_do = front(large)
     assert re.fullmatch(
         r"Finding 1: In sequence look for feet or hands off plates, .*, late forces "
-        r"\(worst: \d+\.\d\d s\)\.",
+        r"\(error worst at \d+\.\d\d s\)\.",
         to_do.items[0],
     )
     assert not any("Nothing needs to be corrected" in item for item in to_do.items)

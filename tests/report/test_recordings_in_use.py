@@ -184,7 +184,7 @@ def test_parameters_wait_for_the_recordings_that_they_are_from(record):
     fine = with_faults(record)
     assert not must_wait(fine)
     assert must_wait(with_faults(record, fault("sync_offset", SEQUENCE))).startswith(
-        "Use RM for now: OM comes from sequence, not usable as recorded."
+        "Use RM for now: OM comes from sequence, unusable as recorded."
     )
     assert not must_wait(with_faults(record, fault("sync_offset", BASKETBALL)))
     table = replace(fine, choice=record.choice.assign(use="RM"))
@@ -324,7 +324,7 @@ def test_findings_without_room_are_named_with_their_numbers(record):
     (links,) = (block for block in front(many) if isinstance(block, Links))
     assert links.to == (("More below", "#wrong"),)
     assert links.rest == (
-        f". 3: {effect_title('marker_shift')}; 4 to 6: {effect_title('missing_joint')}, or 1 other."
+        f". 3: {effect_title('marker_shift')}; 4 to 6: {effect_title('soft_tissue')}, or 1 other."
     )
 
 

@@ -16,7 +16,7 @@ from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import analysed, candidates_of, causes_of, effects_in
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
-from bsip_cli.report.errors import overall_pieces, use_sentence
+from bsip_cli.report.errors import BEFORE, numbered_pieces, use_sentence
 from bsip_cli.report.participant.errors import largest_changes, moment_change
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -145,23 +145,24 @@ def _findings(
         yield _wrapped(line, f"{number:2d}. ")
     if more := len(causes) - len(shown_here):
         yield f"  - {count(more, 'more finding')}: --full"
-    if budget is not None and (pieces := overall_pieces(budget, effects_in(causes))):
+    found = {k: effects_in([c]) for k, c in enumerate(causes, start=1 + len(large))}
+    if budget is not None and (pieces := numbered_pieces(budget, found)):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
-        yield _wrapped(f"The error of the table's parameters (RM): {parts}.", "  - ")
+        yield _wrapped(f"The {BEFORE} (RM): {parts}.", "  - ")
     if choice is not None:
         identified = _table(folder, "identification")
         assert identified is not None  # it was chosen among what was identified
         yield _wrapped(use_sentence(choice, identified, waits), "  - ")
 
 
-def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], bool]:
-    """The answer on the report's first page, its finding of a large error if any, and whether that
-    has to be solved first; nothing where there is no report of this diagnosis."""
+def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], str]:
+    """The answer on the report's first page, its finding of a large error if any, and what has to
+    be done before parameters are used; nothing where there is no report of this diagnosis."""
     page = _path(folder, "report-files")
     if not page.exists() or not is_made_from(page, _path(folder, "overall-diagnosis")):
-        return None, (), False
+        return None, (), ""
     facts = read_header(page, "report-files")["provenance"]["facts"]
-    return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("waits", False)
+    return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("first", "")
 
 
 def _peaks(folder: Path) -> pd.DataFrame:

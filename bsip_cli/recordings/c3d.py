@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit al
 _USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
 _SAME_PLACE_M = 1e-3  # as precise as corners are written
 _PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, that can be distinguished
+_FIRST_YEAR = 1987  # of the format
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -54,6 +56,7 @@ def open_c3d(path: Path) -> Opened:
     plates, about_plates, about_samples = read_plates(content, unit_m, rotation)
     stated, about_person = stated_person(content.parameters)
     about = (*content.findings, *about_points, *about_plates, *scene.findings_about(up))
+    about_person += _recorded_on(content.group("TRIAL"))
     recording = Recording(
         path=path,
         marker_rate_hz=content.rate_hz,
@@ -68,6 +71,16 @@ def open_c3d(path: Path) -> Opened:
         stated=stated,
     )
     return Opened(recording, tuple(plates))
+
+
+def _recorded_on(trial: Group) -> tuple[Finding, ...]:
+    """TRIAL:DATE, where BTS writes year, month and day; nothing where that is no day."""
+    try:
+        day = date(*map(int, np.ravel(whole_numbers(trial, "DATE"))))
+    except (TypeError, ValueError):
+        return ()
+    about = Finding("recorded_on", "", day.isoformat(), "", "said in the report", "info")
+    return (about,) if day.year >= _FIRST_YEAR else ()
 
 
 def _up(

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -86,8 +87,8 @@ class Light(Block):
 
 @dataclass(frozen=True)
 class Bar(Block):
-    """A whole cut into pieces, whose shares [%] add up to 100; a share below zero makes the rest
-    larger and has no length."""
+    """A whole cut into pieces, whose shares [%] add up to 100; what has a share below zero cancels
+    a part of the others, and has no length."""
 
     title: str
     pieces: tuple[Piece, ...]
@@ -105,7 +106,7 @@ class Bar(Block):
 class Scale:
     """A number between what is good and what is too large, all in one unit; ``words`` say which it
     is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
-    arrow points. ``other``: the number by other parameters; empty for none."""
+    arrow points. ``other``: the same by other parameters; None where there are none."""
 
     title: str
     shown: str
@@ -116,7 +117,7 @@ class Scale:
     good: str
     limit: str
     is_beyond: bool = False
-    other: str = ""
+    other: Scale | None = None
 
 
 @dataclass(frozen=True)
@@ -247,6 +248,13 @@ def render(document: Document) -> str:
     return environment.get_template("report.html.j2").render(
         document=document, style=style, files=FILES
     )
+
+
+def words_in(blocks: Iterable[Block]) -> int:
+    """Of a first page without its title, as a reader sees them."""
+    page = render(Document("", "", tuple(blocks), ()))
+    front = page.partition('<main id="front">')[2].partition("</main>")[0]
+    return len(unescape(re.sub(r"<[^>]+>", " ", front)).split())
 
 
 def _cleaned(value: object) -> object:

@@ -51,10 +51,12 @@ class Candidate(Judged):
             f"Correct with this size, as {self.persons} persons of the laboratory share it{alone}."
         )
 
-    def in_words(self, remarks: bool = True) -> str:
-        """What it is with the interval of its main number, and what the markers alone say."""
+    def in_words(self, brief: bool = False) -> str:
+        """What it is with the interval of its main number, and what the markers alone say;
+        ``brief``: in fewest words."""
         main, what = self.main_number(), self.words.what
-        remark = self.words.remark if remarks else ""
+        what = self.words.short or what if brief else what
+        remark = "" if brief else self.words.remark
         interval = main.interval(self.words.is_signed) if main else ""
         if main is None or not interval:
             return what + remark

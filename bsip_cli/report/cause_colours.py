@@ -24,12 +24,17 @@ _CSS = {
 
 @dataclass(frozen=True)
 class Piece:
-    """What some terms, taken together where they look alike, make of an error [%]; kinds : of
-    these, keys of ``COLOURS``."""
+    """What some terms of the error budget, taken together where they look alike, make of an
+    error [%]."""
 
     label: str
     share: float
-    kinds: tuple[str, ...]
+    terms: tuple[str, ...]
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Keys of ``COLOURS``."""
+        return tuple(dict.fromkeys(term.partition(":")[0] for term in self.terms))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ one number; how large they are against yardsticks; what makes them."""
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +14,16 @@ from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
 from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import COMPONENTS, TEXTS, component_label, count, listing, number, signed
+from bsip_cli.report.words import (
+    COMPONENTS,
+    TEXTS,
+    component_label,
+    count,
+    findings,
+    listing,
+    number,
+    signed,
+)
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
@@ -113,13 +122,13 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
 def use_sentence(
     choice: pd.DataFrame | None,
     identification: pd.DataFrame,
-    waits: bool = False,
+    waits: str = "",
     is_known: bool = False,
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names. ``waits``: something else is to be done first; ``is_known``: what
-    the method is has been said."""
-    use = "Once that is solved, use" if waits else "Use"
+    the artifacts of these names. ``waits``: what is to be done first; ``is_known``: what the method
+    is has been said."""
+    use = f"{waits} Then use" if waits else "Use"
     if choice is None or choice.empty:
         return f"{use} {RM if is_known else TEXTS['methods_in_full'][RM]}: nothing was compared."
     first = choice.iloc[0]
@@ -133,17 +142,16 @@ def use_sentence(
     most = str(first["use"]) if is_known else TEXTS["methods_in_full"][str(first["use"])]
     if others:
         most = f"{brief(str(first['use']))} for all other movements"
-    said = f"{use} {', and '.join([*others, most])}{_compared(first, together=bool(others))}."
-    rare = identification[identification["rare"].astype(bool)]
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
-    ]
+    rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
+    compared = _compared(first, together=bool(others), is_rare=OM in rare)
+    said = f"{use} {', and '.join([*others, most])}{compared}."
+    warned = [f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare]
     return " ".join([said, *warned])
 
 
-def _compared(first: pd.Series, together: bool) -> str:
+def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
     """What the choice rests on, to go on with after the method's name; ``together``: over movements
-    of which some ask for another method."""
+    of which some ask for another method; ``is_rare``: OM is ruled out by its body."""
     if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
         return ": no recording is left to judge OM by"
     om, scaled, over_scaled = (
@@ -157,25 +165,27 @@ def _compared(first: pd.Series, together: bool) -> str:
         "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
-        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
-    table, times = "RM (table)", "RM+mass (RM, scaled)"
-    table = RM if together or first["use"] == RM else table
-    said = f"{om} than {table} and {times}"
+        return (
+            f": {where}its error is {scaled} than RM's, and OM's error {over_scaled} than RM+mass's"
+        )
+    said = f"{om} than RM's and RM+mass's"
     if om != over_scaled:
-        said = f"{om} than {table}, {over_scaled} than {times}"
-    if first["use"] == OM:
-        return f": {where}it errs {said}"
-    return f": OM (identified) is not clearly better; {where}it errs {said}"
+        said = f"{om} than RM's, {over_scaled} than RM+mass's"
+    if first["use"] == RM and not is_rare:
+        return f": OM is not clearly better; {where}its error is {said}"
+    whose = "its" if first["use"] == OM and not together else "OM's"
+    return f": {where}{whose} error is {said}"
 
 
 def _change(ratio: float, log_error: float) -> str:
-    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
+    """``31 to 45 % smaller`` or ``5 % smaller to 16 % larger``: one standard error to either
+    side."""
     ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
     if not np.isfinite(ends).all():
         ends = [100 * (ratio - 1)] * 2
-    words = ["less" if end < 0 else "more" for end in ends]
+    words = ["smaller" if end < 0 else "larger" for end in ends]
     if words[0] != words[1]:
-        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
+        return f"{number(-ends[0], 0)} % smaller to {number(ends[1], 0)} % larger"
     sizes = [number(size, 0) for size in sorted(map(abs, ends))]
     return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
 
@@ -187,7 +197,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Good: Hansen 2017; large: Hicks 2015; markers: OpenSim."
+SOURCES = "Marks: good (Hansen 2017), large (Hicks 2015; markers: OpenSim)."
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
@@ -224,9 +234,9 @@ class Yardstick:
             return "large"
         return "good" if value <= self.good else "ordinary"
 
-    def scale(self, value: float, other: str = "") -> Scale:
+    def scale(self, value: float, other: Scale | None = None) -> Scale:
         """On a scale from nothing to a fixed multiple of the limit, in every report the same.
-        ``other``: what other parameters give, in words."""
+        ``other``: what other parameters give."""
         end = ENDS_AT * self.limit
         return Scale(
             self.title,
@@ -235,8 +245,8 @@ class Yardstick:
             min(value / end, 1.0) if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"good to {self.good:.2g}",
-            f"large from {number(self.limit, 0)}",
+            f"{self.good:.2g}",
+            number(self.limit, 0),
             bool(value > end),
             other,
         )
@@ -286,10 +296,12 @@ def _error(fit: pd.DataFrame) -> Mapping[str, float]:
 
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
+BEFORE = "squared error before identification"  # RM's, of which the budget is
 REST = "all others"
 UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
+_UNSURE = "too unsure for a finding"
 _LAST = ("noise", UNKNOWN)
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
@@ -303,13 +315,54 @@ def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tupl
     return _cut(budget[whole & (budget["component"] == component)].set_index("term"), found)
 
 
-def overall_pieces(budget: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
+def overall_pieces(
+    budget: pd.DataFrame,
+    found: Collection[str],
+    trial: str = "",
+    components: Sequence[str] = FIRST,
+) -> tuple[Piece, ...]:
     """The same of the mean over the vertical force and both directions of the centre of pressure,
     as far as their errors are of interest; terms that look alike in one count together in all, and
-    what rounds to nothing is left out."""
-    shares = _overall(budget)
+    what rounds to nothing is left out. ``trial``: of this one alone."""
+    shares = _overall(budget, trial, components)
     whole = () if shares.empty else _cut(shares, found)
     return tuple(one for one in whole if abs(one.share) >= _LEAST)
+
+
+_PART_OF = {  # findings that the budget has in another term, which holds what is usual too
+    "soft_tissue": "soft_tissue",
+    "missing_joint": "trunk_and_shoulders",
+    "marker_shift": "marker_places",
+    "joint_centre": "joint_centres",
+    "over_smoothing": "smoothing",
+    "unexplained": UNKNOWN,
+}
+
+
+def numbered_pieces(
+    budget: pd.DataFrame, found: Mapping[int, Collection[str]]
+) -> tuple[Piece, ...]:
+    """The same, each with the numbers of the findings that it belongs to; ``found``: the effects
+    in each finding, by its number."""
+    known = {*budget["term"]}
+    terms = {
+        k: {own if (own := f"{_FAULT}{x}") in known else _PART_OF.get(x, own) for x in effects}
+        for k, effects in found.items()
+    }
+    pieces = overall_pieces(budget, {one for effects in found.values() for one in effects})
+    numbers = ([k for k, mine in terms.items() if mine & {*one.terms}] for one in pieces)
+    return tuple(map(_with_remarks, pieces, numbers))
+
+
+def _with_remarks(piece: Piece, numbers: Sequence[int]) -> Piece:
+    """With the findings in its label, and with what a share below zero means."""
+    label = piece.label.removesuffix(f" ({_UNSURE})")
+    said = [_UNSURE] if label != piece.label else []
+    if numbers:
+        is_fault = cause_colours.FAULT in piece.kinds
+        said.append(f"{'' if is_fault else 'with '}{findings(numbers)}")
+    said += ["cancels some"] if piece.share < 0 else []
+    return replace(piece, label=f"{label} ({'; '.join(said)})") if said else piece
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
@@ -319,9 +372,11 @@ def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
     return float(shares.loc[mine, "share_percent"].sum()) if len(shares) else np.nan
 
 
-def _overall(budget: pd.DataFrame) -> pd.DataFrame:
-    large = [one for one in FIRST if size_of(budget, one)[0] >= LEAST_REPORTED_SIZE]
-    mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
+def _overall(
+    budget: pd.DataFrame, trial: str = "", components: Sequence[str] = FIRST
+) -> pd.DataFrame:
+    large = [one for one in components if size_of(budget, one, trial)[0] >= LEAST_REPORTED_SIZE]
+    mine = budget[(budget["trial"] == trial) & (budget["target"] == "")]
     by_term = mine[mine["component"].isin(large)].groupby("term", sort=False)
     alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
     return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
@@ -331,10 +386,9 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     """What was found has its own piece, however small."""
     large, last = [], []
     for terms in _groups(rows):
-        label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
+        label = _label(terms, found)
         share = float(rows.loc[list(terms), "share_percent"].sum())
-        kinds = [cause_colours.FAULT if term.startswith(_FAULT) else term for term in terms]
-        piece = Piece(label, share, tuple(dict.fromkeys(kinds)))
+        piece = Piece(label, share, terms)
         least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
@@ -365,20 +419,21 @@ def term_words(term: str) -> str:
     return str(TEXTS["terms"][term])
 
 
-def _label(term: str, found: Collection[str]) -> str:
-    """A fault that is not reported has only the share that it may have."""
-    unsure = term.startswith(_FAULT) and term.removeprefix(_FAULT) not in found
-    return f"{'perhaps ' if unsure else ''}{term_words(term)}"
+def _label(terms: Sequence[str], found: Collection[str]) -> str:
+    """A fault that is no finding has only the share that it may have."""
+    faults = {term.removeprefix(_FAULT) for term in terms if term.startswith(_FAULT)}
+    unsure = f" ({_UNSURE})" if faults and not faults & {*found} else ""
+    return " or ".join(dict.fromkeys(map(term_words, terms))) + unsure
 
 
-def size_of(budget: pd.DataFrame, component: str) -> tuple[float, str]:
-    """RM's error of a component in all trials together, and its unit."""
-    row = _total(budget, component)
+def size_of(budget: pd.DataFrame, component: str, trial: str = "") -> tuple[float, str]:
+    """RM's error of a component in all trials together, or in one, and its unit."""
+    row = _total(budget, component, trial)
     return (np.nan, "") if row is None else (float(row["rms"]), str(row["unit"]))
 
 
-def _total(budget: pd.DataFrame, component: str) -> pd.Series | None:
-    mine = (budget["trial"] == "") & (budget["component"] == component)
+def _total(budget: pd.DataFrame, component: str, trial: str = "") -> pd.Series | None:
+    mine = (budget["trial"] == trial) & (budget["component"] == component)
     rows = budget[mine & (budget["term"] == "total")]
     return None if rows.empty else rows.iloc[0]
 

@@ -2,69 +2,84 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report import blocks, verdict
+from bsip_cli.report import blocks, errors, records, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
-from bsip_cli.report.errors import MARKERS, SOURCES, overall_pieces, use_sentence
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
     is_said,
     large_alone,
     large_finding,
+    largest_in,
     light_for,
     measured_of,
     must_wait,
     names_of,
     number_of_main_part,
+    numbered,
     use_lines,
     worst_of,
 )
 from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, abbreviations, capital, count, listing, number
-from bsip_cli.statistics.methods import RM
+from bsip_cli.report.words import TEXTS, abbreviations, capital, count, in_a_row, listing, number
+from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 2  # findings in full
+_MOST_WORDS = 393  # with the title 400
+_FINDINGS = ((2, 4), (2, 2), (1, 2))  # in full, and kinds that are named only
 _FEW = 3  # findings, whose actions are all given
-_MOST_KINDS = 4  # of findings that are named only
 _MOST_TO_DO = 3
+_MOST_FILES = 2  # that are named
 _POSES = 8  # among which the one is chosen that is shown
 
 
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
-    """The blocks of the first page, in the order in which a reader asks."""
+    """The blocks of the first page, in the order in which a reader asks; as many findings as there
+    is room for."""
+    for most, named in _FINDINGS:
+        page = tuple(_in_order(record, most, named))
+        if blocks.words_in(page) <= _MOST_WORDS:
+            break
+    return *portrait(record), *page
+
+
+def _in_order(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
+    """``most``: findings in full; ``named``: kinds of findings of which only the name is given."""
     light = light_for(record)
-    has_findings = record.causes or large_finding(record)
-    return (
-        *portrait(record),
+    says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
+    yield from (
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
-        replace(light, text="") if has_findings and light.state == "large" else light,
-        *_causes(record),
+        replace(light, text="") if says_it else light,
+        *_causes(record, most, named),
         *_sizes(record),
         *_sure(record, light),
         blocks.Heading("What may be used?"),
         blocks.Bullets(tuple(use_lines(record))),
         blocks.Paragraph(
-            use_sentence(record.choice, record.identification, must_wait(record), is_known=True)
+            errors.use_sentence(
+                record.choice, record.identification, must_wait(record), is_known=True
+            )
         ),
         blocks.Heading("What to do next"),
-        blocks.Bullets(tuple(to_do(record, light))),
+        blocks.Bullets(tuple(to_do(record, light, most))),
     )
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
-    """Names and what is known: the person, the recordings, the software."""
+    """Names and what is known: the person, the recordings and their files, the parameters, the
+    report."""
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
     sex = f"{_SEXES[facts['sex']]}, " if facts["sex"] in _SEXES else ""
@@ -76,17 +91,34 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     times = {name: names.count(name) for name in names}
     tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
     short = abbreviations(names)
-    stems = tuple(f"{trial.stem}." for trial in record.trials)
-    files = sum(name.startswith(stems) for name in HowMade.of(record.origins).files)
-    said = [*([short] if short else []), count(files, "file")]
-    yield "Recordings", f"{listing(tasks)} ({'; '.join(said)})"
-    used = listing([trial.label for trial in record.identification_trials()])
-    yield "Identified from", used
+    yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}; {_recorded(record)}"
+    yield "Files", _files(record)
+    used = listing([names_of(record)[t.stem] for t in record.identification_trials()], "nothing")
+    yield "Parameters", TEXTS["parameters"].format(trials=used)
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
-    yield "Software", f"bsip {', '.join(versions)}"
+    yield "Report", f"{record.made_on}, bsip {', '.join(versions)}"
     for name in ("mass", "height"):
         if note := str(record.facts[f"{name}_note"]):
             yield capital(name), f"{capital(note)}."
+
+
+def _recorded(record: ParticipantRecord) -> str:
+    """When, as the study or else its files say."""
+    tables = [trial.quality for trial in record.trials if trial.quality is not None]
+    said = [day for t in tables for day in t.loc[t["check"] == "recorded_on", "found"]]
+    days = sorted(record.recorded_on or said)
+    first_and_last = " to ".join(dict.fromkeys((*days[:1], *days[-1:])))
+    return f"recorded {first_and_last}" if days else "date unknown"
+
+
+def _files(record: ParticipantRecord) -> str:
+    """Names of few; of many how many there are, and how they begin and end."""
+    stems, begin = tuple(f"{trial.stem}." for trial in record.trials), f"{record.id}_"
+    names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
+    if len(names) > _MOST_FILES:
+        kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
+        return f"{len(names)} ({begin}*{listing(kinds)})"
+    return listing(names)
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -119,13 +151,13 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
+def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
     """A line per finding, the most important first; of those that have no room what they are."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
     peaks, large = all_peaks(record.trials), large_finding(record)
-    shown = _causes_shown(record)
+    shown = _causes_shown(record, most)
     lines = [
         verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
         for cause in shown
@@ -135,11 +167,12 @@ def _causes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if more := record.causes[len(shown) :]:
         address = (("More below", f"#{verdict.ALL_FAULTS}"),)
         first = 1 + len(large) + len(shown)
-        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first))}.")
+        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first, named))}.")
 
 
-def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str]:
-    """``3 and 5: marker not in its place``; findings of which one may be the other count together."""
+def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> Iterator[str]:
+    """``3 and 5: marker not in its place``; findings of which one may be the other count together,
+    by the name that most of them may have."""
     groups: list[tuple[list[int], list[str]]] = []
     for k, cause in enumerate(causes, first):
         titles = [effect_title(one.effect) for one in cause]
@@ -149,18 +182,17 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int) -> Iterator[str
         groups = [group for group in groups if group not in mine]
         groups.append((sorted(merged), titles))
     groups.sort()
-    for numbers, titles in groups[:_MOST_KINDS]:
-        which = listing([str(k) for k in numbers])
-        if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-            which = f"{numbers[0]} to {numbers[-1]}"
-        yield f"{which}: {' / '.join(dict.fromkeys(titles))}"
-    if rest := sum(len(numbers) for numbers, _ in groups[_MOST_KINDS:]):
+    for numbers, titles in groups[:named]:
+        (name, _), *others = Counter(titles).most_common()
+        more = f", or {count(len(others), 'other')}" if others else ""
+        yield f"{in_a_row(numbers)}: {name}{more}"
+    if rest := sum(len(numbers) for numbers, _ in groups[named:]):
         yield f"{rest} more"
 
 
-def _causes_shown(record: ParticipantRecord) -> tuple[Sequence[Candidate], ...]:
+def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
     """Those of which the page says all."""
-    return record.causes[: _MOST - len(large_finding(record))]
+    return record.causes[: most - len(large_finding(record))]
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -172,8 +204,8 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     said = []
     if light.state == "large":
         known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-        said.append(f"The large error is certain{'' if known else ', its cause unknown'}.")
-        unseen = unseen if known else verdict.MAY_HIDE
+        said.append(TEXTS["sure"]["known" if known else "unknown"])
+        unseen = unseen if known else ""
     elif not record.causes:
         said.append("No fault is more probable than not.")
     said.append(unseen)
@@ -186,36 +218,40 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """The yardsticks, and what makes the error: each says of which parameters it is."""
-    use, bar = record.use(), tuple(budget_bar(record))
-    table = {one.name: number(size) for one, size in measured_of(record, RM)} if bar else {}
-    scales = []
-    for one, size in measured_of(record):
-        other = table.get(one.name, number(size))
-        scales.append(one.scale(size, "" if other == number(size) else f"with {RM} {other}"))
-    named = use if large_finding(record) else METHODS[use]  # the finding says what it is
-    yield blocks.Heading(f"How large are the errors with {named}?")
+    """The yardsticks by the parameters to use and by the table's, and what makes these errors."""
+    use = record.use()
+    with_table = (one.scale(size) for one, size in measured_of(record, RM))
+    scales = [
+        one.scale(size, other if other.shown != one.scale(size).shown else None)
+        for (one, size), other in zip(measured_of(record), with_table, strict=True)
+    ]
+    which = f"? ● {use}, ○ {RM}" if use != RM else f" with {RM}?"
+    yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
-    yield blocks.Paragraph(SOURCES, "note")
-    yield from bar
+    yield blocks.Paragraph(errors.SOURCES, "note")
+    yield from budget_bar(record)
 
 
 def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """What makes the error of the table's parameters, as one bar."""
+    """What makes the error of the table's parameters, as one bar, and how to read it."""
     if record.budget is None:
         return
-    if pieces := overall_pieces(record.budget, effects_in(record.causes)):
+    findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
+    if pieces := errors.numbered_pieces(record.budget, findings):
         use = record.use()
-        other = f" of {METHODS[RM]}, not {use}" if use != RM else ", by cause"
-        yield blocks.Bar(f"What makes the squared error{other}", pieces)
+        known = f"{errors.PARAMETERS} (OM corrects these)" if use == OM else errors.PARAMETERS
+        pieces = tuple(replace(p, label=p.label.replace(errors.PARAMETERS, known)) for p in pieces)
+        yield blocks.Bar(
+            f"What makes the {errors.BEFORE if use != RM else 'squared error'}:", pieces
+        )
 
 
 # --- what to do ---------------------------------------------------------------------------------
 
 
-def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
+def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str]:
     """At most three things."""
-    causes, first = _causes_shown(record), 1 + len(large_finding(record))
+    causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
     few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record)
@@ -226,9 +262,9 @@ def to_do(record: ParticipantRecord, light: blocks.Light) -> list[str]:
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    if not beyond(record) and (alone := large_alone(record)):
-        where = listing([names_of(record)[trial.stem] for trial in alone])
-        said.append(TEXTS["to_do"]["forces"].format(trial=where))
+    if not beyond(record):
+        alone = (_look_for(record, *largest_in(record, one)) for one in large_alone(record))
+        said += filter(None, alone)
     if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine" and not said:
@@ -247,10 +283,43 @@ def _look_at(record: ParticipantRecord) -> Iterator[str]:
         return
     is_finding = bool(large_finding(record)) or is_said(record)
     number_of_it = "Finding 1: " if is_finding else ""
-    texts = TEXTS["to_do"]
     for one, _ in beyond(record)[:1]:
         worst = worst_of(record, one)
-        if one.name == MARKERS:
-            yield f"{number_of_it}{texts['markers']}"
-        elif worst is not None:
-            yield f"{number_of_it}{texts['forces'].format(trial=names_of(record)[worst.stem])}"
+        if one.name == errors.MARKERS:
+            yield f"{number_of_it}{TEXTS['to_do']['markers']}"
+        elif worst is not None and (text := _look_for(record, worst, one)):
+            yield f"{number_of_it}{text}"
+
+
+_OF = {errors.COP: ("cop_ap", "cop_ml"), errors.FORCE: ("fz",)}  # components of the error budget
+_SIGNALS = {errors.COP: ("cop_ap_m", "cop_ml_m"), errors.FORCE: ("fz_N",)}
+
+
+def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yardstick) -> str:
+    """What makes the largest part of a recording's error and what helps; empty where that is a
+    finding; where it is not known, when the error is largest and what may be its cause."""
+    name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
+    budget, of = record.budget, (trial.stem, _OF[error.name])
+    if budget is not None and (parts := errors.overall_pieces(budget, found, *of)):
+        main = max(parts, key=lambda one: one.share)
+        if {term.partition(":")[2] for term in main.terms} & found:
+            return ""
+        helps = [texts["helps"].get(kind, "") for kind in main.kinds]
+        if all(helps):
+            return texts["part"].format(
+                trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
+            )
+    at = _largest_at(trial, record.use(), _SIGNALS[error.name])
+    when = "" if at is None else f" (error worst at {number(at, 2)} s)"
+    return texts["forces"].format(trial=name, when=when)
+
+
+def _largest_at(trial: TrialRecord, method: str, columns: Sequence[str]) -> float | None:
+    """When [s] the simulated signals are farthest from the measured ones; None if not known."""
+    table = trial.reconstruction
+    if table is None or method not in set(table["method"]):
+        return None
+    signals = [records.signals_of(table, column) for column in columns]
+    off = np.sum([(one[method] - one[MEASURED]) ** 2 for one in signals], axis=0)
+    off = np.where(records.flags_of(table, "valid") & np.isfinite(off), off, 0.0)
+    return float(records.clock_of(table)[np.argmax(off)]) if off.any() else None

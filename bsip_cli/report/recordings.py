@@ -23,7 +23,14 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import METHODS, TEXTS, listing, number, task_of, trial_label
+from bsip_cli.report.words import (
+    TEXTS,
+    findings,
+    listing,
+    number,
+    task_of,
+    trial_label,
+)
 from bsip_cli.statistics.methods import OM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
@@ -65,6 +72,12 @@ def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | N
     }
     worst = max(sizes, key=sizes.__getitem__, default="")
     return next((trial for trial in record.trials if trial.stem == worst), None)
+
+
+def largest_in(record: ParticipantRecord, trial: TrialRecord) -> tuple[TrialRecord, Yardstick]:
+    """The recording, and which of its errors of the forces is farthest beyond its yardstick."""
+    own = [pair for pair in _own(record, trial) if pair[0].name != MARKERS]
+    return trial, max(own, key=lambda pair: np.nan_to_num(pair[1]) / pair[0].limit)[0]
 
 
 def names_of(record: ParticipantRecord) -> dict[str, str]:
@@ -113,8 +126,10 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     found = beyond(record)
     if not found or is_said(record) or light_for(record).state != "large":
         return ()
-    sizes = [f"{one.short()} {number(size)} {one.brief_unit()}" for one, size in found]
-    said = f"Large error with {METHODS[record.use()]}: {listing(sizes)}"
+    errors = [one.short() for one, _ in found]  # of several the yardsticks have the sizes
+    if len(found) == 1:
+        errors[0] += f" {number(found[0][1])} {found[0][0].brief_unit()}"
+    said = f"Large error with {record.use()}: {listing(errors)}"
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"
@@ -145,6 +160,11 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     if number_of := number_of_main_part(record):
         return f"the largest part is finding {number_of}"
     return "" if part.label in light_for(record).title else f"the largest part is {part.label}"
+
+
+def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
+    """What the diagnosis found, by its number in the report."""
+    return dict(enumerate(record.causes, start=1 + len(large_finding(record))))
 
 
 def number_of_main_part(record: ParticipantRecord) -> int:
@@ -204,47 +224,46 @@ def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
     return listing(items)
 
 
-def must_wait(record: ParticipantRecord) -> bool:
-    """Whether no parameters should be used yet: errors are large and no recording may be used, or
-    not all of those may that identified the parameters to use."""
-    uses = uses_of(record)
+def must_wait(record: ParticipantRecord) -> str:
+    """Why the parameters should not be used yet, and what to do: not all recordings that identified
+    those to use may be used themselves, or errors are large and no recording may; else empty."""
+    uses, names = uses_of(record), names_of(record)
     usable = {stem for stem, use in uses.items() if use.kind in ("full", "care")}
-    own = {trial.stem for trial in record.identification_trials()} if record.use() == OM else set()
-    return not own <= usable or (light_for(record).state == "large" and not usable)
+    own = [t.stem for t in record.identification_trials() if t.stem not in usable]
+    if record.use() == OM and own:
+        return TEXTS["usable"]["identified"].format(trials=listing([names[stem] for stem in own]))
+    return TEXTS["usable"]["large"] if light_for(record).state == "large" and not usable else ""
 
 
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     """Of each recording, by its stem, as far as its errors and the findings tell."""
-    first = 1 + len(large_finding(record))
-    return {trial.stem: _use_of(record, trial, first) for trial in record.trials}
+    causes = numbered(record)
+    return {trial.stem: _use_of(record, trial, causes) for trial in record.trials}
 
 
-def _use_of(record: ParticipantRecord, trial: TrialRecord, first: int) -> Use:
-    """By the worst of its markers, its forces and the findings that concern it; ``first``: the
-    number of the first finding of the diagnosis."""
+def _use_of(
+    record: ParticipantRecord, trial: TrialRecord, causes: dict[int, tuple[Candidate, ...]]
+) -> Use:
+    """By the worst of its markers, its forces and the findings that concern it; ``causes``: all
+    findings of the diagnosis by their numbers."""
     if trial.kinematics is None or trial.kinematics.empty:
         return Use("out", "no motion was computed")
-    found = {k: c for k, c in enumerate(record.causes, first) if _concerns(c, trial)}
+    found = {k: cause for k, cause in causes.items() if _concerns(cause, trial)}
     large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
     sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
     if MARKERS in sizes:
         return Use("out", listing([*sizes.values()]), sizes[MARKERS])
-    unexplained = _numbered([k for k, cause in found.items() if is_large(cause)])
-    moved = _numbered([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
+    unexplained = findings([k for k, cause in found.items() if is_large(cause)])
+    moved = findings([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
     if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
         after = f"after {moved}" if moved else ""
         return Use("motion", "; ".join(filter(None, (listing(wrong), after))), after or wrong[0])
     if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
         return Use("motion", "forces could not be compared")
-    correct = _numbered([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
+    correct = findings([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
     if correct:
         return Use("corrected", correct)
-    return Use("care" if found else "full", _numbered([*found]))
-
-
-def _numbered(findings: Sequence[int]) -> str:
-    words = "finding" if len(findings) == 1 else "findings"
-    return f"{words} {listing([str(k) for k in findings])}" if findings else ""
+    return Use("care" if found else "full", findings([*found]))
 
 
 def _concerns(cause: Sequence[Candidate], trial: TrialRecord) -> bool:

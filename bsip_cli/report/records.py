@@ -64,8 +64,8 @@ class TrialRecord:
 
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
-    """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
+    """One participant; ``facts`` is the single row of the ``person`` artifact, ``made_on`` the day
+    of the report, ``recorded_on`` those of the recordings as the study states them, ``loads`` the known loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
     ``changes`` (of a model extended by what was found), and ``choice`` are None where their stages
     have not run. ``defaults`` : every option's shipped value."""
 
@@ -79,6 +79,8 @@ class ParticipantRecord:
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
     defaults: Mapping[str, Any]
+    made_on: str
+    recorded_on: tuple[str, ...] = ()
     loads: tuple[tuple[str, str], ...] = ()
     diagnosis: pd.DataFrame | None = None
     detection: pd.DataFrame | None = None

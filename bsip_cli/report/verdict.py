@@ -39,6 +39,7 @@ from bsip_cli.report.words import (
     capital,
     component_label,
     count,
+    findings,
     listing,
     number,
     segment_label,
@@ -153,7 +154,7 @@ def light_of(
         return Light("fine", title, nothing)
     share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of RM's squared error."
+    named = "" if np.isnan(share) else f"What was found makes {size} of the {errors.BEFORE}."
     title = capital(found) if large is None else f"{capital(found)}; {no_large}"
     return Light("cause", title, named or f"Searched: {looked}.")
 
@@ -202,11 +203,13 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
     some = _MOST_NAMED < len(one.trials) < len(everywhere)
     where = where_seen(one.trials, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
+    title = capital(effect_title(one.effect))  # as the error budget calls it
     if is_large(cause):
-        return f"{capital(one.words.short)}, {where}; {one.words.against}."
+        return f"{title}: {one.words.short}, {where}; {one.words.against}."
     said = [one.against_usual(), f"; {at_joints}" if at_joints else ""]
     said += [f"; probability {sure}" if sure else ""]
-    line = f"{capital(one.in_words(remarks=False))}, {where}{''.join(said)}."
+    what = one.in_words(brief=True).removeprefix("of unknown cause: ")
+    line = f"{title}: {what}, {where}{''.join(said)}."
     return f"{line} {one.which_size(short=True)}".rstrip()
 
 
@@ -221,7 +224,8 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
         )
     ranked = sorted(cause, key=lambda one: one.effect == UNNAMED)
     members = [
-        "an error of unknown cause" if one.effect == UNNAMED else one.words.short or one.words.what
+        effect_title(one.effect)
+        + ("" if one.effect == UNNAMED else f" ({one.words.short or one.words.what})")
         for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
     ]
     places = Counter(effect_title(one.effect) for one in ranked[len(members) :])
@@ -396,11 +400,7 @@ def consequences(
             numbers.setdefault(text, []).append(k)
     if len(causes) == first == 1 and not only_actions:
         return tuple(filter(None, numbers))
-    return tuple(
-        f"{'Finding' if len(of) == 1 else 'Findings'} {listing([str(k) for k in of])}: {text}"
-        for text, of in numbers.items()
-        if text
-    )
+    return tuple(f"{capital(findings(of))}: {text}" for text, of in numbers.items() if text)
 
 
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:

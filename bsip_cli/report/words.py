@@ -72,6 +72,20 @@ def listing(items: Sequence[str], empty: str = "none") -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
+def findings(numbers: Sequence[int]) -> str:
+    """``finding 2``, ``findings 1 and 3`` or ``findings 5 to 8``; empty without any."""
+    if not numbers:
+        return ""
+    return f"finding{'s' if len(numbers) > 1 else ''} {in_a_row(numbers)}"
+
+
+def in_a_row(numbers: Sequence[int]) -> str:
+    """``2``, ``1 and 3`` or ``5 to 8``, of numbers that rise."""
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    return listing([str(k) for k in numbers])
+
+
 def count(n: int, singular: str, plural: str = "") -> str:
     """``1 trial``, ``2 trials``."""
     return f"{n} {singular if n == 1 else plural or singular + 's'}"

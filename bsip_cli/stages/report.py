@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from datetime import date
 from pathlib import Path
 
 import pandas as pd
@@ -36,7 +37,7 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {"light": asdict(light), "large": large_finding(record), "waits": must_wait(record)}
+    facts = {"light": asdict(light), "large": large_finding(record), "first": must_wait(record)}
     unit.write("report-files", rows, facts=facts)
 
 
@@ -72,6 +73,12 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.person),
         origins=_origins(unit, usable),
         defaults=unit.shipped_options(),
+        made_on=date.today().isoformat(),
+        recorded_on=tuple(
+            day
+            for name, day in unit.config.laboratory.recorded_on.items()
+            if name.partition("_ses-")[0] == unit.person.id
+        ),
         loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),

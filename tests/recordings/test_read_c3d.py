@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 
+import ezc3d
 import numpy as np
 import pytest
 
@@ -339,3 +340,22 @@ def test_missing_file_is_refused(tmp_path):
         read_recording(tmp_path / "none.c3d")
     with pytest.raises(BadDataError):
         read_recording(tmp_path / "a.txt")
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ((2019, 5, 24), ["2019-05-24"]),
+        ((24, 5, 2019), []),
+        ((19, 5, 24), []),
+        ((2019, 5), []),
+        ((0, 0, 0), []),
+    ],
+)
+def test_a_day_of_recording_is_said_where_it_is_one(tmp_path, written, said):
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = ezc3d.c3d(str(path))
+    content.add_parameter("TRIAL", "DATE", list(written))
+    content.write(str(path))
+    findings = read_recording(path).findings
+    assert [f.found for f in findings if f.check == "recorded_on"] == said

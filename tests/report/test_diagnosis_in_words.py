@@ -15,7 +15,13 @@ from bsip_cli.report.effect_words import (
     separating_recording,
     size_words,
 )
-from bsip_cli.report.errors import budget_sentences, found_share, overall_pieces, pieces
+from bsip_cli.report.errors import (
+    budget_sentences,
+    found_share,
+    numbered_pieces,
+    overall_pieces,
+    pieces,
+)
 from bsip_cli.report.participant.document import limit_blocks, nearest
 from bsip_cli.report.verdict import (
     Verdict,
@@ -200,8 +206,8 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
     assert said.limits == "Faults of any size may hide behind so large an error."
     (cause,) = causes_of(candidates_of(large))
     assert cause_line(cause, TRIALS) == (
-        "23 N of the vertical force (RMS) remain unexplained, only in sequence (run 1); large "
-        "is 15.2 N and more."
+        "Error of unknown cause: 23 N of the vertical force (RMS) remain unexplained, only in "
+        "sequence (run 1); large is 15.2 N and more."
     )
     both = pd.concat([large, found[found["rank"] > 1]])
     assert (
@@ -461,6 +467,19 @@ def test_what_was_found_has_its_own_piece_and_makes_as_much_as_it_says(share):
     assert found_share(fault, found) == pytest.approx(share)
     others = {one.label for one in overall_pieces(fault, ())}
     assert {label for label in others if title in label} == (
-        {f"perhaps {title}"} if share > 5 else set()
+        {f"{title} (too unsure for a finding)"} if share > 5 else set()
     )
     assert found_share(fault, {"sync_offset"}) == found_share(table, found) == 0.0
+
+
+def test_parts_of_the_bar_have_the_numbers_of_their_findings():
+    table = error_budget(["sub-01_task-squat_run-1"])
+    table = table.assign(alike="", term=table["term"].replace("noise", "fault:plate_gain"))
+    shares = table["share_percent"].mask(table["term"] == "smoothing", -10.0)
+    found = {2: {"plate_gain"}, 3: {"plate_gain", "sync_offset"}, 5: {"soft_tissue"}}
+    labels = [one.label for one in numbered_pieces(table.assign(share_percent=shares), found)]
+    gain = EFFECT_WORDS["plate_gain"].title
+    assert f"{gain} (findings 2 and 3)" in labels
+    assert "soft tissue (with finding 5)" in labels  # which has what is usual too
+    assert "smoothing of the motion (cancels some)" in labels
+    assert "the table's segment parameters" in labels

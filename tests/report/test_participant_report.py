@@ -3,6 +3,7 @@
 import hashlib
 import re
 from dataclasses import replace
+from datetime import date
 from html import unescape
 from xml.etree import ElementTree
 
@@ -10,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.blocks import Light, Numbered, Picture
+from bsip_cli.report.blocks import Light, Links, Numbered, Picture
 from bsip_cli.report.errors import use_sentence
-from bsip_cli.report.first_page import front
+from bsip_cli.report.first_page import front, who
 from bsip_cli.report.participant import errors
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.recordings import large_finding, light_for
@@ -22,6 +23,7 @@ from bsip_cli.report.words import number, with_spread
 from bsip_cli.stages.report import record_of
 from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs
 
+FILE = "sub-01_task-static.c3d"
 TITLES = (
     "Is anything wrong, and how sure is that?",
     "How large are the errors, when, and what makes them?",
@@ -132,23 +134,57 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
     assert "2 faults found; no large error" in first
     assert (
-        "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "both recordings, a usual size (1 to 4°); changes the left knee's moment by 9 % of its "
-        "peak; probability 99.5 %." in first
+        "Force plate turned or tilted: plate 1 is turned by +2.0 degrees (about the vertical: 95 % "
+        "interval 1.75 to 2.26°), in both recordings, a usual size (1 to 4°); changes the left "
+        "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "How large are the errors with OM (identified)?" in first
-    assert "What makes the squared error of RM (table), not OM" in first
-    assert "the table's segment parameters 70 %" in first
+    assert "How large are the errors? ● OM, ○ RM" in first
+    assert "What makes the squared error before identification:" in first
+    assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first
-    assert "Markers from model: 6.7 mm , good" in first
+    assert "Markers from model: 6.7 mm (good)" in first
     assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
     assert (
-        "Once that is solved, use RM for basketball, where OM is not clearly better, and OM for "
-        "all other movements: in both other recordings it errs 34 to 46 % less than RM," in first
+        "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
+        "another (study.toml: roles); run again. Then use RM for basketball, where OM is not "
+        "clearly better, and OM for all other movements: in both other recordings OM's error is "
+        "34 to 46 % smaller than RM's," in first
     )
-    assert re.search(r"\(\d+ files?\)", first)
+    assert f"Files {FILE} Parameters RM (regression method): a table;" in first
+    assert "OM (optimisation method): identified from sequence" in first
+    assert f"sequence and basketball; date unknown Files {FILE}" in first
+    assert f"Report {date.today().isoformat()}, bsip 0" in first
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
+
+
+def test_it_says_when_as_the_study_or_else_the_files_say(record):
+    def said(one: ParticipantRecord) -> str:
+        return dict(who(one))["Recordings"].rpartition("; ")[2]
+
+    assert said(record) == "date unknown"
+    row = record.trials[0].quality.iloc[0].copy()
+    row["check"], row["found"], row["level"] = "recorded_on", "2019-05-24", "info"
+    dated = pd.concat([record.trials[0].quality, row.to_frame().T])
+    files = replace(record, trials=(replace(record.trials[0], quality=dated), *record.trials[1:]))
+    assert said(files) == "recorded 2019-05-24"
+    study = replace(files, recorded_on=("2024-03-02", "2024-03-01"))
+    assert said(study) == "recorded 2024-03-01 to 2024-03-02"
+
+
+def test_of_many_files_it_says_how_many_and_of_which_kind(record):
+    names = [f"{trial.stem}.{kind}" for trial in record.trials for kind in ("mot", "trc")]
+    origins = (replace(record.origins[0], inputs=dict.fromkeys(names, "ab")),)
+    assert dict(who(replace(record, origins=origins)))["Files"] == "6 (sub-01_*.mot and .trc)"
+
+
+def test_a_page_without_room_has_fewer_findings(record, monkeypatch):
+    assert len(next(x for x in front(record) if isinstance(x, Numbered)).items) == 2
+    monkeypatch.setattr("bsip_cli.report.first_page._MOST_WORDS", 200)
+    page = front(record)
+    (numbered,) = (block for block in page if isinstance(block, Numbered))
+    (links,) = (block for block in page if isinstance(block, Links))
+    assert len(numbered.items) == 1 and links.rest.startswith(". 2: ")
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
@@ -203,8 +239,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     assert (light.state, light.title) == ("large", "Large error even with identified parameters")
     (finding,) = large_finding(large)
     assert finding.startswith(
-        "Large error with OM (identified): vertical force 5.5 %, most in sequence; cause unknown: "
-        "none of the"
+        "Large error with OM: vertical force 5.5 %, most in sequence; cause unknown: none of the"
     )
     (numbered,) = (block for block in front(large) if isinstance(block, Numbered))
     assert numbered.items == (finding,)
@@ -212,7 +247,11 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
         "Large with OM (identified): vertical force 5.5 % of body weight. None of the"
     )
     *_, to_do = front(large)
-    assert to_do.items[0].startswith("Finding 1: In sequence look for feet or hands off the plates")
+    assert re.fullmatch(
+        r"Finding 1: In sequence look for feet or hands off plates, .*, late forces "
+        r"\(error worst at \d+\.\d\d s\)\.",
+        to_do.items[0],
+    )
     assert not any("Nothing needs to be corrected" in item for item in to_do.items)
 
 
@@ -230,14 +269,15 @@ def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(choice, record.identification)
     assert said.startswith("Use RM (parameters of an anthropometric table)")
-    assert (
-        ": OM (identified) is not clearly better; in 2 other recordings it errs 5 % less to" in said
-    )
+    assert ": OM is not clearly better; in 2 other recordings its error is 5 % smaller to" in said
     one = use_sentence(record.choice[:1], record.identification)
     assert one.startswith("Use OM (parameters identified from this person): in 2 other recordings")
-    assert "it errs 34 to 46 % less than RM (table)," in one
+    assert "its error is 34 to 46 % smaller than RM's," in one
     held = use_sentence(record.choice.assign(data="held_out"), record.identification)
-    assert ": in all seconds of 2 recordings that were held out it errs 34 to 46 % less" in held
+    held_out = (
+        ": in all seconds of 2 recordings that were held out OM's error is 34 to 46 % smaller"
+    )
+    assert held_out in held
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

@@ -48,7 +48,7 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     assert len(text.splitlines()) <= 24 and max(map(len, text.splitlines())) <= 100
     assert text.startswith("sub-01: 2 faults found")
     flat = " ".join(text.split())
-    assert " 1. Plate 1 is turned by +2.0 degrees" in flat
+    assert " 1. Force plate turned or tilted: plate 1 is turned by +2.0 degrees" in flat
     assert "and OM (identified) for all other movements" in flat
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)

@@ -50,8 +50,8 @@ def participant_document(record: records.ParticipantRecord) -> Document:
     made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     return Document(
-        title=f"{record.id}: do motion and measured forces agree?",
-        subtitle="Plates' ground forces against those computed from markers.",
+        title=f"{record.id}: do force plates and markers agree?",
+        subtitle="",
         front=front(record),
         sections=(
             diagnosis_section(record),

@@ -302,7 +302,7 @@ def moment_change(
     most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
     percent = most["change_percent"]
     if rows["change_percent"].max() < 1.0:
-        return "changes no joint moment by as much as 1 %"
+        return "joint moments change under 1 %"
     return (
         f"changes the {in_words(most['joint'])}'s moment by "
         f"{number(percent, 0 if percent >= 1.0 else 1)} % of its peak"

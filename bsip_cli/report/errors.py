@@ -270,10 +270,10 @@ def _published(variable: str) -> float:
     return float(np.median([row.cells[OM].mean for row in rows if OM in row.cells]))
 
 
-def errors_of(fits: Iterable[pd.DataFrame], method: str) -> dict[str, float]:
-    """Errors of a method over trials, from tables ``fit``: the root mean square of those with
-    held-out data, or of all where there are none; NaN where nothing is known."""
-    rows = [_error(fit[fit["method"] == method]) for fit in fits]
+def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
+    """Errors over trials, from rows of one method of each one's table ``fit``: the root mean square
+    of those with held-out data, or of all where there are none; NaN where nothing is known."""
+    rows = [_error(fit) for fit in fits]
     known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
     chosen = [row for row in known if row["held_out"]] or known
     found = {}

@@ -219,13 +219,12 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use and by the table's, and what makes these errors."""
-    use = record.use()
     with_table = (one.scale(size) for one, size in measured_of(record, RM))
     scales = [
         one.scale(size, other if other.shown != one.scale(size).shown else None)
         for (one, size), other in zip(measured_of(record), with_table, strict=True)
     ]
-    which = f"? ● {use}, ○ {RM}" if use != RM else f" with {RM}?"
+    which = f"? ● {record.use_words()}, ○ {RM}" if record.use_words() != RM else f" with {RM}?"
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(errors.SOURCES, "note")
@@ -309,7 +308,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
             return texts["part"].format(
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
-    at = _largest_at(trial, record.use(), _SIGNALS[error.name])
+    at = _largest_at(trial, record.use(trial.task), _SIGNALS[error.name])
     when = "" if at is None else f" (error worst at {number(at, 2)} s)"
     return texts["forces"].format(trial=name, when=when)
 

@@ -44,8 +44,12 @@ _MOST_RUNS = 4  # of a task, in a line
 
 def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yardstick, float], ...]:
     """The three yardsticks with this person's numbers, by a method, or by the one to use."""
-    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
-    values = errors_of(fits, method or record.use())
+    fits = [
+        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
+        for trial in record.moving_trials()
+        if trial.fit is not None
+    ]
+    values = errors_of(fits)
     values[MARKERS] = 1e3 * float(record.facts["marker_rms_m"])
     return tuple((one, values[one.name]) for one in _yardsticks(record))
 
@@ -97,7 +101,8 @@ def _yardsticks(record: ParticipantRecord) -> tuple[Yardstick, ...]:
 
 def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick, float], ...]:
     """The yardsticks with a recording's own numbers, by the method to use."""
-    values = errors_of([] if trial.fit is None else [trial.fit], record.use())
+    fit = record.used_fit(trial)
+    values = errors_of([] if fit is None else [fit])
     markers = np.empty(0) if trial.kinematics is None else trial.kinematics["marker_rms_m"]
     squares = np.asarray(markers, dtype=float) ** 2
     squares = squares[np.isfinite(squares)]
@@ -129,7 +134,7 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     errors = [one.short() for one, _ in found]  # of several the yardsticks have the sizes
     if len(found) == 1:
         errors[0] += f" {number(found[0][1])} {found[0][0].brief_unit()}"
-    said = f"Large error with {record.use()}: {listing(errors)}"
+    said = f"Large error with {record.use_words()}: {listing(errors)}"
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"

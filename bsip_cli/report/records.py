@@ -114,9 +114,27 @@ class ParticipantRecord:
         """Those in which somebody moves: quiet stance distinguishes no methods."""
         return tuple(trial for trial in self.trials if trial.role != "static")
 
-    def use(self) -> str:
-        """The method whose parameters are to be used; the table's where nothing was chosen."""
-        return RM if self.choice is None or self.choice.empty else str(self.choice["use"].iloc[0])
+    def use(self, movement: str = "all") -> str:
+        """The method whose parameters are to be used, in one movement or mostly; the table's where
+        nothing was chosen."""
+        if self.choice is None or self.choice.empty:
+            return RM
+        chosen = self.choice.set_index("movement")["use"]
+        return str(chosen.get(movement, chosen.iloc[0]))
+
+    def use_words(self) -> str:
+        """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""
+        others: dict[str, list[str]] = {}
+        for movement in dict.fromkeys(trial.task for trial in self.moving_trials()):
+            others.setdefault(self.use(movement), []).append(movement)
+        others.pop(self.use(), None)
+        said = "; ".join(f"{', '.join(some)}: {method}" for method, some in others.items())
+        return f"{self.use()} ({said})" if said else self.use()
+
+    def used_fit(self, trial: TrialRecord) -> pd.DataFrame | None:
+        """Of a trial's ``fit`` the rows of the parameters to use in its movement."""
+        fit = trial.fit
+        return None if fit is None else fit[fit["method"] == self.use(trial.task)]
 
     def option(self, section: str, name: str) -> float:
         """An option that a stage was run with, or as shipped."""

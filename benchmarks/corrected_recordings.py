@@ -26,9 +26,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.diagnosis_of_recordings import SUBJECTS
 from benchmarks.measure import RESULTS, ROOT, markdown, run_child, write_csv
-from benchmarks.recordings import make_study
+from benchmarks.recordings import STUDIES, make_study
 from bsip_cli.recordings.read import read_recording
 
 _STAGES = """
@@ -182,8 +181,8 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
         if not make_children(study, data / ZOO):
             return None
     else:
-        subject = next(one for one in SUBJECTS if one.source.name == case.source)
-        if not make_study(study, data, subject.source):
+        source = next(one for one in STUDIES if one.name == case.source and one.diagnosed)
+        if not make_study(study, data, source):
             return None
     fault = ("--effect", case.effect, "--size", repr(case.size), "--target", case.target)
     bsip("inject", study, hidden, *fault)

@@ -11,7 +11,6 @@ which one arm moves a little; always judged on the same trials, none of which id
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -20,7 +19,7 @@ import pandas as pd
 
 from benchmarks.accuracy_measures import TRUTH, force_errors, segment_errors
 from benchmarks.accuracy_study import ONE_ARM, SQUATS, write_study
-from benchmarks.measure import ROOT, markdown, run_child
+from benchmarks.measure import bsip, markdown
 from bsip_cli.statistics.methods import ALTERNATIVES, OM, RM
 
 ESTIMATORS = ("consistent", "hansen2017", "robert2017", "base")
@@ -32,7 +31,6 @@ RECORDINGS = {
 JUDGED = ["throwing", "basketball", "squat", "steps", "walking", "running"]
 COMPONENTS = ["fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml"]
 STAGES = ("ingest", "scale", "ik", "regress", "identify")
-BAD_DATA = 3  # some trial was refused, the rest is done
 LITTLE = "too little motion"
 
 
@@ -42,8 +40,7 @@ def identify(study: Path, out: Path, task: str) -> Path:
     names = ", ".join(f'"{name}"' for name in ESTIMATORS)
     options.write_text(f'[roles]\nsequence = ["{task}"]\n[identify]\nestimators = [{names}]\n')
     for stage in STAGES:
-        command = [sys.executable, "-m", "bsip_cli", stage, str(study), "--out", str(out)]
-        run_child([*command, "--config", str(options)], folder=ROOT, allowed=BAD_DATA)
+        bsip(stage, study, "--out", out, "--config", options)
     return options
 
 

@@ -19,8 +19,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from benchmarks.measure import ROOT, machine, markdown, run_child
-from benchmarks.participant import run_stage, study_options
+from benchmarks.measure import bsip, machine, markdown
+from benchmarks.participant import study_options
 from bsip_cli.pipeline import STAGES
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.study import simulate_study
@@ -75,9 +75,8 @@ def make_cohort(model: Path, folder: Path, n: int) -> None:
 
 def measured(folder: Path) -> tuple[float, float, float]:
     """CPU-seconds, seconds of the clock and MB of the group's stages."""
-    command = [sys.executable, "-m", "bsip_cli", "run", str(folder / "study"), "--group"]
     began = time.monotonic()
-    usage = run_child([*command, "--out", str(folder / "out")], folder=ROOT)
+    usage = bsip("run", folder / "study", "--group", "--out", folder / "out")
     return usage.cpu_s, time.monotonic() - began, usage.peak_mb
 
 
@@ -90,7 +89,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         model = Path(name) / "model"
         simulate_study(model / "study", study_options(arguments.sequence_s, SEED))
-        run_stage("run", model / "study", model / "out")
+        bsip("run", model / "study", "--out", model / "out")
         for n in arguments.participants:
             folder = Path(name) / str(n)
             make_cohort(model, folder, n)

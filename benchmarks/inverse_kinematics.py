@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
+from benchmarks.measure import cpu_seconds, interleaved, machine, markdown, run_child
 from benchmarks.moving_person import movement, noisy_markers, sample_person, standing
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.exports.identified import IdentifiedPerson
@@ -222,7 +222,7 @@ def compile_rows() -> list[list[str]]:
     command = [sys.executable, "-m", "benchmarks.inverse_kinematics", "--first-call"]
     with tempfile.TemporaryDirectory() as cache:
         for label in ("first solve, empty cache", "first solve, cached"):
-            used = run_child(command, {"NUMBA_CACHE_DIR": cache}, ROOT)
+            used = run_child(command, {"NUMBA_CACHE_DIR": cache})
             first, second = json.loads(used.stdout.splitlines()[-1])
             rows.append([label, f"{first - second:.2f}"])
     return rows

@@ -8,14 +8,13 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.measure import ROOT, Usage, machine, markdown, run_child
+from benchmarks.measure import bsip, machine, markdown, run_child
 from bsip_cli.pipeline import STAGES
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
 TARGET_CPU_S = 20.0
 DIAGNOSIS = ("diagnose", "extend")  # not in the target
-BAD_DATA = 3  # some trial was refused, the rest is done
 
 
 Found = tuple[str, float, float, float]
@@ -47,22 +46,16 @@ def stage_names() -> list[str]:
     return list(dict.fromkeys(stage.name for stage in STAGES))
 
 
-def run_stage(name: str, study: Path, out: Path, *extra: str) -> Usage:
-    arguments = [sys.executable, "-m", "bsip_cli", name, str(study), "--out", str(out), *extra]
-    return run_child(arguments, folder=ROOT, allowed=BAD_DATA)
-
-
 def import_cpu_s(name: str) -> float:
     """What importing the modules of a stage costs on top of what its command always imports."""
     modules = [stage.module for stage in STAGES if stage.name == name]
     levels = {stage.level == "cohort" for stage in STAGES if stage.name == name}
     alone = len(levels) == 1  # else its modules are imported in two processes
     groups = [modules] if alone else [[module] for module in modules]
-    base = run_child([sys.executable, "-c", "import bsip_cli.running.runner"], folder=ROOT).cpu_s
+    base = run_child([sys.executable, "-c", "import bsip_cli.running.runner"]).cpu_s
     return sum(
         run_child(
-            [sys.executable, "-c", f"import bsip_cli.running.runner, {', '.join(group)}"],
-            folder=ROOT,
+            [sys.executable, "-c", f"import bsip_cli.running.runner, {', '.join(group)}"]
         ).cpu_s
         - base
         for group in groups
@@ -73,8 +66,8 @@ def measure(study: Path, out: Path, rounds: int) -> list[Found]:
     """What every command takes."""
     found = []
     for name in stage_names():
-        forced = [run_stage(name, study, out, "--force") for _ in range(rounds)]
-        fresh = [run_stage(name, study, out) for _ in range(rounds)]
+        forced = [bsip(name, study, "--out", out, "--force") for _ in range(rounds)]
+        fresh = [bsip(name, study, "--out", out) for _ in range(rounds)]
         imports = statistics.median(import_cpu_s(name) for _ in range(rounds))
         start = statistics.median(usage.cpu_s for usage in fresh) + imports
         total = statistics.median(usage.cpu_s for usage in forced)
@@ -114,23 +107,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         study, out = Path(folder, "study"), Path(folder, "out")
         simulate_study(study, study_options(options.sequence_s, options.seed, options.marker_hz))
-        run_stage("run", study, out)  # everything compiled once
+        bsip("run", study, "--out", out)  # everything compiled once
         print(f"machine: {machine()}; medians of {options.rounds} rounds\n")
         found = measure(study, out, options.rounds)
         print(table(found))
         (person,) = (path.name for path in study.glob("sub-*"))
         print(f"\nrecordings: {size_of(study / person)}; results: {size_of(out / person)}")
         whole = statistics.median(
-            run_stage("run", study, out, "--force").cpu_s for _ in range(options.rounds)
+            bsip("run", study, "--out", out, "--force").cpu_s for _ in range(options.rounds)
         )
     diagnosis = sum(work for name, work, _, _ in found if name in DIAGNOSIS)
     print(
         f"\n`bsip run`, all stages in one command: {whole:.1f} CPU-s with starting and importing;"
     )
     print(f"without diagnosis {whole - diagnosis:.1f} (target: at most {TARGET_CPU_S:g} CPU-s)")
-    help_s = statistics.median(
-        run_child([sys.executable, "-m", "bsip_cli", "--help"], folder=ROOT).cpu_s for _ in range(5)
-    )
+    help_s = statistics.median(bsip("--help").cpu_s for _ in range(5))
     print(f"`bsip --help`: {help_s:.2f} CPU-s (target: under 0.5)")
 
 

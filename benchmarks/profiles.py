@@ -18,8 +18,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bsip_cli
-from benchmarks.measure import RESULTS, machine, markdown, write_csv
-from benchmarks.participant import run_stage, study_options
+from benchmarks.measure import RESULTS, bsip, machine, markdown, write_csv
+from benchmarks.participant import study_options
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.running.runner import perform
 from bsip_cli.running.session import OpenedStudy, open_study
@@ -83,7 +83,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         study, out = Path(folder, "study"), Path(folder, "out")
         simulate_study(study, study_options(options.sequence_s, SEED))
-        run_stage("run", study, out)  # everything compiled once
+        bsip("run", study, "--out", out)  # everything compiled once
         opened = open_study(study, out, (), None)
         rows = []
         for name in dict.fromkeys(stage.name for stage in STAGES):

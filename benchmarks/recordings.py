@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.measure import RESULTS, markdown, write_csv
-from benchmarks.participant import run_stage
+from benchmarks.measure import RESULTS, bsip, markdown, write_csv
 from bsip_cli.statistics.methods import METHODS
 from tests.real.figaroh_csv import convert
 
@@ -168,7 +167,7 @@ def tables(data: Path, folder: Path) -> dict[str, list[Row]]:
 
 def _said(stage: str, study: Path, out: Path) -> list[str]:
     """Run a stage; its warnings."""
-    lines = run_stage(stage, study, out).stderr.splitlines()
+    lines = bsip(stage, study, "--out", out).stderr.splitlines()
     return [line for line in lines if line.startswith(f"{stage}:")]
 
 

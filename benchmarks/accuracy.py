@@ -229,15 +229,12 @@ def force_errors(study: Path, out: Path, options: list[Path], tasks: list[str]) 
 
 # --- tables ---------------------------------------------------------------------------------------
 
-_SHOWN = {  # title and decimals
-    "mass": ("mass [kg]", 3),
-    "centre": ("centre of mass [mm]", 1),
-    "inertias": ("principal inertias [%]", 1),
-    "physical": ("possible bodies [%]", 1),
-    "mass from RM": ("mass from RM's [kg]", 3),
-    "centre from RM": ("centre from RM's [mm]", 1),
-    **{name: (f"{name} inside [%]", 1) for name in (*_GROUPS, "all")},
+_ERRORS = {
+    "mass [kg]": "mass",
+    "centre of mass [mm]": "centre",
+    "principal inertias [%]": "inertias",
 }
+_APART = {"mass from RM's [kg]": "mass from RM", "centre from RM's [mm]": "centre from RM"}
 
 
 def named(table: pd.DataFrame) -> pd.DataFrame:
@@ -252,29 +249,34 @@ def means_of(found: pd.DataFrame, *by: str) -> pd.DataFrame:
     return means
 
 
-def table_of(rows: Mapping[str, pd.Series], columns: Sequence[str]) -> str:
+def table_of(
+    corner: Sequence[str], rows: Mapping[tuple[str, ...], pd.Series], columns: Mapping[str, str]
+) -> str:
+    """Means under titles, kilograms with three decimals."""
     cells = [
-        [name, *(f"{row[column]:.{_SHOWN[column][1]}f}" for column in columns)]
-        for name, row in rows.items()
+        [*names, *(f"{row[c]:.{3 if 'kg' in title else 1}f}" for title, c in columns.items())]
+        for names, row in rows.items()
     ]
-    return markdown(["method", *(_SHOWN[column][0] for column in columns)], cells)
+    return markdown([*corner, *columns], cells)
 
 
 def segment_table(found: pd.DataFrame) -> str:
     means = means_of(found, "method")
-    return table_of({method: means.loc[method] for method in WITH_SEGMENTS}, [*_SHOWN][:6])
+    columns = _ERRORS | {"possible bodies [%]": "physical"} | _APART
+    return table_of(["method"], {(m,): means.loc[m] for m in WITH_SEGMENTS}, columns)
 
 
 def sex_table(found: pd.DataFrame) -> str:
     means, methods = means_of(found, "sex", "method"), (*ALTERNATIVES, ESTIMATORS[0])
     people = (("F", "women"), ("M", "men"))
-    rows = {f"{title}, {m}": means.loc[(sex, m)] for sex, title in people for m in methods}
-    return table_of(rows, ["mass", "centre", "inertias", "all"])
+    rows = {(title, m): means.loc[(sex, m)] for sex, title in people for m in methods}
+    return table_of(["", "method"], rows, _ERRORS | {"inside [%]": "all"})
 
 
 def coverage_table(found: pd.DataFrame) -> str:
-    means = means_of(found, "method")
-    return table_of({method: means.loc[method] for method in WITH_SEGMENTS}, [*_GROUPS, "all"])
+    means, corner = means_of(found, "method"), ["95 % intervals that hold the truth [%]"]
+    rows = {(m,): means.loc[m] for m in WITH_SEGMENTS}
+    return table_of(corner, rows, {name: name for name in (*_GROUPS, "all")})
 
 
 def each_segment_table(found: pd.DataFrame) -> str:
@@ -293,7 +295,8 @@ def each_segment_table(found: pd.DataFrame) -> str:
         cells += [" ".join(f"{frame.loc[segment, g]:.0f}" for frame in (rm, om)) for g in _GROUPS]
         rows.append(cells)
     header = ["", "RM [kg]", "OM [kg]", "OM/RM", "RM [mm]", "OM [mm]", "OM/RM"]
-    return markdown([*header, *(f"{group} inside, RM OM [%]" for group in _GROUPS)], rows)
+    inside = [f"{group} inside, RM OM [%]" for group in ("masses", "centres", "tensors")]
+    return markdown([*header, *inside], rows)
 
 
 def better_in(found: pd.DataFrame) -> str:

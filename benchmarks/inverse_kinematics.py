@@ -36,6 +36,7 @@ from bsip_cli.motion.inverse_kinematics import (
     tree_of,
 )
 from bsip_cli.motion.smoothing import smooth_motion
+from tests.body.standing_person import joint_frames, random_poses
 
 NOISE_M = 0.005
 # No robust limit and hardly a prior: the same sum of squares as OpenSim's.
@@ -178,25 +179,9 @@ def pinocchio_loop(person: Person, markers_m: np.ndarray, q_first: np.ndarray) -
 
 def forward_difference(person: Person, count: int) -> float:
     """Largest difference [1 and m] of forward kinematics to Pinocchio's at random poses."""
-    model = pinocchio_model(person)
-    data, rng = model.createData(), np.random.default_rng(3)
-    spread = np.where(np.arange(model.nv) < 3, 0.7, 1.0)
-    start = standing(person)
-    q = np.stack(
-        [pin.integrate(model, start, rng.normal(0, 1, model.nv) * spread) for _ in range(count)]
-    )
-    R, p = tree_of(person).forward(q)
-    worst = 0.0
-    for k in range(count):
-        pin.forwardKinematics(model, data, q[k])
-        for i in range(model.njoints - 1):
-            placement = data.oMi[i + 1]
-            worst = max(
-                worst,
-                np.abs(placement.rotation - R[k, i]).max(),
-                np.abs(placement.translation - p[k, i]).max(),
-            )
-    return float(worst)
+    q = random_poses(person, count, 1.0, seed=3)
+    pairs = zip(tree_of(person).forward(q), joint_frames(person, q), strict=True)
+    return max(float(np.abs(ours - theirs).max()) for ours, theirs in pairs)
 
 
 def rms_of(person: Person, q: np.ndarray, markers_m: np.ndarray) -> np.ndarray:

@@ -63,10 +63,7 @@ def run_child(
 ) -> Usage:
     """Run a process in a folder to its end.
 
-    Raises
-    ------
-    RuntimeError
-        Its exit code is negative or above ``allowed``.
+    RuntimeError: its exit code is negative or above ``allowed``.
     """
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", _LIGHT_PARENT, *arguments],

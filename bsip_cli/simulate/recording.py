@@ -11,10 +11,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.instruments.readings import Instruments, SensingPlate
+from bsip_cli.segments import without_side
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing, kind_of
+from bsip_cli.simulate.landmarks import Marker, Swing
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
@@ -205,7 +206,7 @@ def marker_paths(
 def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
     """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
     own, side = poses.rotation[marker.body], marker.body[-2:]
-    first, second = (name.replace("*", side) for name in NEIGHBOURS[kind_of(marker.body)])
+    first, second = (name.replace("*", side) for name in NEIGHBOURS[without_side(marker.body)])
     bodies = (first, MOVED_BY_THE_ARM.get(label, second))
     turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
     sines = np.concatenate(turns, axis=1)

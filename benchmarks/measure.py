@@ -63,7 +63,7 @@ def run_child(
 ) -> Usage:
     """Run a process in a folder to its end.
 
-    RuntimeError: its exit code is negative or above ``allowed``.
+    RuntimeError: its exit code is neither 0 nor ``allowed``.
     """
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", _LIGHT_PARENT, *arguments],
@@ -75,7 +75,7 @@ def run_child(
     )
     *printed, last = done.stdout.splitlines()
     code, cpu_s, peak_mb = json.loads(last)
-    if not 0 <= code <= allowed:
+    if code not in (0, allowed):
         raise RuntimeError(f"{' '.join(arguments)} ended with {code}\n{done.stderr}")
     return Usage(cpu_s, peak_mb, "\n".join(printed), done.stderr, code)
 

@@ -15,47 +15,45 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
+import pandas as pd
 import pyarrow.parquet as pq
 
-from benchmarks.measure import ROOT, machine, markdown, run_child
-from benchmarks.participant import run_stage, study_options
+from benchmarks.measure import bsip, machine, markdown
+from benchmarks.participant import study_options
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.pipeline import STAGES
-from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.study import simulate_study
 
 SPREAD = 0.05  # of a number over the participants, of itself
+AS_IT_IS = "laboratory-information"  # its numbers are a matrix that is no precision any more
 SEED = 1
 
 
-def read_by_the_group() -> set[str]:
-    """Names of the artifacts of one participant or trial that the stages of the group read."""
-    kinds = {kind for stage in STAGES if stage.level == "cohort" for kind in stage.inputs}
-    return {SCHEMAS[kind].file_name for kind in kinds if SCHEMAS[kind].level != "cohort"}
-
-
-def another(table: pa.Table, old: str, new: str, rng: np.random.Generator) -> pa.Table:
+def another(
+    table: pd.DataFrame, spread: float, old: str, new: str, rng: np.random.Generator
+) -> pd.DataFrame:
     """The table with every number a little other, and of another participant."""
-    for k, field in enumerate(table.schema):
-        column = table.column(k)
-        if pa.types.is_floating(field.type):
-            factors = 1.0 + SPREAD * rng.standard_normal(len(table))
-            table = table.set_column(k, field, pc.multiply(column, pa.array(factors)))
-        elif pa.types.is_string(field.type):
-            table = table.set_column(k, field, pc.replace_substring(column, old, new))
-    return table
+    numbers = table.select_dtypes("floating")
+    factors = 1.0 + spread * rng.standard_normal(numbers.shape)
+    words = {
+        name: text.str.replace(old, new) for name, text in table.items() if text.dtype == "str"
+    }
+    return table.assign(**(numbers * factors), **words)
 
 
 def make_cohort(model: Path, folder: Path, n: int) -> None:
-    """A study of ``n`` participants and their artifacts, after the one of ``model``."""
+    """A study of ``n`` participants, after the one of ``model``, with the artifacts that the stages
+    of the group read."""
     rng = np.random.default_rng(SEED)
     (one,) = (path.name for path in (model / "study").glob("sub-*"))
     recordings = [path.name for path in (model / "study" / one).iterdir()]
+    read = {kind for stage in STAGES if stage.level == "cohort" for kind in stage.inputs}
+    paths = sorted((model / "out" / one).glob("*.parquet"))
+    headers = {path: read_header(path) for path in paths}
     artifacts = {
-        path.name: pq.read_table(path)
-        for path in sorted((model / "out" / one).glob("*.parquet"))
-        if path.stem.split("_")[-1] in read_by_the_group()
+        path.name: (header["kind"], read_artifact(path, header["kind"]), header["provenance"])
+        for path, header in headers.items()
+        if header["kind"] in read
     }
     rows = ["participant_id\tsex\tmass_kg\theight_m"]
     for k in range(n):
@@ -65,9 +63,10 @@ def make_cohort(model: Path, folder: Path, n: int) -> None:
             (folder / place / name).mkdir(parents=True)
         for recording in recordings:
             (folder / "study" / name / recording.replace(one, name)).touch()
-        for file, table in artifacts.items():
+        for file, (kind, table, provenance) in artifacts.items():
             path = folder / "out" / name / file.replace(one, name)
-            pq.write_table(another(table, one, name, rng), path, write_page_checksum=True)
+            spread = 0.0 if kind == AS_IT_IS else SPREAD
+            write_artifact(path, kind, another(table, spread, one, name, rng), provenance)
     (folder / "study" / "participants.tsv").write_text("\n".join(rows) + "\n")
     toml = model / "study" / "study.toml"
     (folder / "study" / "study.toml").write_bytes(toml.read_bytes())
@@ -75,9 +74,8 @@ def make_cohort(model: Path, folder: Path, n: int) -> None:
 
 def measured(folder: Path) -> tuple[float, float, float]:
     """CPU-seconds, seconds of the clock and MB of the group's stages."""
-    command = [sys.executable, "-m", "bsip_cli", "run", str(folder / "study"), "--group"]
     began = time.monotonic()
-    usage = run_child([*command, "--out", str(folder / "out")], folder=ROOT)
+    usage = bsip("run", folder / "study", "--group", "--out", folder / "out")
     return usage.cpu_s, time.monotonic() - began, usage.peak_mb
 
 
@@ -90,7 +88,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         model = Path(name) / "model"
         simulate_study(model / "study", study_options(arguments.sequence_s, SEED))
-        run_stage("run", model / "study", model / "out")
+        bsip("run", model / "study", "--out", model / "out")
         for n in arguments.participants:
             folder = Path(name) / str(n)
             make_cohort(model, folder, n)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import csv
 import re
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -26,20 +25,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.diagnosis_of_recordings import SUBJECTS
-from benchmarks.measure import RESULTS, ROOT, markdown, run_child, write_csv
-from benchmarks.recordings import make_study
+from benchmarks.measure import RESULTS, bsip, markdown, write_csv
+from benchmarks.recordings import STUDIES, make_study
 from bsip_cli.recordings.read import read_recording
 
-_STAGES = """
-import sys
-from pathlib import Path
-from bsip_cli.running.session import run_session
-study, out = map(Path, sys.argv[1:])
-stages = "ingest scale ik regress identify reconstruct laboratory diagnose".split()
-print(max(run_session(stage, study, out, (), None, jobs=1, force=False) for stage in stages))
-"""
-BAD_DATA = 3  # some trial was refused, the rest is done
+STAGES = ["ingest", "scale", "ik", "regress", "identify", "reconstruct", "laboratory", "diagnose"]
 SEEDS = (5101, 5102)
 HEADER = (
     *("hidden", "before", "corrected", "afterwards", "still told", "free"),
@@ -182,8 +172,8 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
         if not make_children(study, data / ZOO):
             return None
     else:
-        subject = next(one for one in SUBJECTS if one.source.name == case.source)
-        if not make_study(study, data, subject.source):
+        source = next(one for one in STUDIES if one.name == case.source and one.diagnosed)
+        if not make_study(study, data, source):
             return None
     fault = ("--effect", case.effect, "--size", repr(case.size), "--target", case.target)
     bsip("inject", study, hidden, *fault)
@@ -192,7 +182,7 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
     after = diagnosed(fixed, scratch / "again")
     known = isinstance(case.source, int)
     errors = tuple(error_of(study, one) for one in (hidden, fixed)) if known else ()
-    return Result(before, *corrected_in(said), after, errors)
+    return Result(before, *corrected_in(said.stderr), after, errors)
 
 
 def error_of(study: Path, other: Path) -> float:
@@ -250,9 +240,8 @@ def _key(words: str) -> Key:
 
 def diagnosed(study: Path, out: Path) -> dict[Key, str]:
     """Run the stages; sizes of what is named or in a group, and of labels exchanged by ik."""
-    done = run_child([sys.executable, "-c", _STAGES, str(study), str(out)], folder=ROOT)
-    if done.stdout.strip().splitlines()[-1] not in ("0", str(BAD_DATA)):
-        raise RuntimeError(done.stderr)
+    for stage in STAGES:
+        bsip(stage, study, "--out", out)
     tables = pd.concat(map(pd.read_parquet, sorted(out.glob("sub-*/sub-??_diagnosis.parquet"))))
     found: dict[Key, str] = {}
     for row in tables[tables["verdict"] != "rejected"].itertuples():
@@ -265,15 +254,6 @@ def diagnosed(study: Path, out: Path) -> dict[Key, str]:
         pair = "+".join(sorted((str(one.marker), str(one.partner))))
         found["marker_swap", pair] = f"{one.end_s - one.start_s:.3g} s"
     return found
-
-
-def bsip(*arguments: object) -> str:
-    """Run a command; what it says."""
-    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
-    if done.returncode not in (0, BAD_DATA):
-        raise RuntimeError(f"{' '.join(command)}\n{done.stderr}")
-    return done.stderr
 
 
 def table(results: dict[Case, Result]) -> list[Row]:

@@ -7,8 +7,7 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from benchmarks.measure import RESULTS, machine, markdown, write_csv
-from benchmarks.participant import run_stage
+from benchmarks.measure import RESULTS, bsip, machine, markdown, write_csv
 from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
@@ -52,9 +51,9 @@ def cpu_s(tasks: tuple[str, ...], hidden: tuple[Asked, ...], seed: int) -> tuple
         study, out = Path(folder, "study"), Path(folder, "out")
         simulate_study(study, options_of(tasks, hidden, seed))
         for stage in BEFORE:
-            run_stage(stage, study, out)
-        work = run_stage("diagnose", study, out).cpu_s
-        return work, run_stage("diagnose", study, out).cpu_s
+            bsip(stage, study, "--out", out)
+        work, start = (bsip("diagnose", study, "--out", out).cpu_s for _ in range(2))
+        return work, start
 
 
 def rows_of(seeds: list[int]) -> list[list[str]]:

@@ -129,7 +129,7 @@ def contest(folder: Path, python: str, rounds: int) -> tuple[dict, dict]:
     printed: dict[str, list[dict]] = {name: [] for name in commands}
     for _ in range(rounds):
         for name, command in commands.items():
-            stdout = run_child(command, folder=ROOT).stdout
+            stdout = run_child(command).stdout
             printed[name].append(json.loads(stdout.splitlines()[-1]))
     bsip, figaroh = (
         {

@@ -12,6 +12,7 @@ import argparse
 import json
 import sys
 import tempfile
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,14 +20,23 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from benchmarks import opensim_model, pinocchio_loop
-from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
+from benchmarks.measure import cpu_seconds, interleaved, machine, markdown, run_child
 from benchmarks.moving_person import movement, noisy_markers, sample_person, standing
+from bsip_cli.body.anthropometry import regress
+from bsip_cli.body.exports.identified import IdentifiedPerson
+from bsip_cli.body.exports.osim import osim_text
 from bsip_cli.body.person import Person
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
-from bsip_cli.motion.inverse_kinematics import Poses, model_markers, solve_poses, tree_of
+from bsip_cli.motion.inverse_kinematics import (
+    Poses,
+    model_markers,
+    solve_poses,
+    subtrees,
+    tree_of,
+)
 from bsip_cli.motion.smoothing import smooth_motion
+from tests.body.standing_person import joint_frames, random_poses
 
 NOISE_M = 0.005
 # No robust limit and hardly a prior: the same sum of squares as OpenSim's.
@@ -40,6 +50,8 @@ CONFIG = load_config([])
 AS_SHIPPED = CONFIG.ik.model_dump(include=set(SAME_PROBLEM))
 SMOOTHING = CONFIG.smoothing.model_dump() | {"robust_limit_m": CONFIG.ik.robust_limit_m}
 FEW = 10
+JOINTS = ("ball", "custom")  # of OpenSim: turned by quaternions, and by three angles in turn
+STEPS = 20
 OPTIMUM = (
     "marker RMS, bsip [mm]",
     "marker RMS, OpenSim [mm]",
@@ -71,8 +83,8 @@ def run_opensim(
     count = len(markers_m)
     with tempfile.TemporaryDirectory() as folder:
         model, markers = Path(folder, "person.osim"), Path(folder, "markers.trc")
-        model.write_text(opensim_model.model_xml(person, joint_family), encoding="utf-8")
-        markers.write_text(opensim_model.trc_text(person.markers, markers_m, rate_hz), "utf-8")
+        model.write_text(opensim_model(person, joint_family), encoding="utf-8")
+        markers.write_text(trc_text(person.markers, markers_m, rate_hz), encoding="utf-8")
         worker = str(Path(__file__).resolve().with_name("opensim_worker.py"))
         sizes = [str(number) for number in (count, FEW, rate_hz, accuracy)]
         used = run_child([python, worker, str(model), str(markers), *sizes], folder=Path(folder))
@@ -80,6 +92,30 @@ def run_opensim(
     printed = json.loads(used.stdout.splitlines()[-1])
     per_frame = (printed["all"] - printed["few"]) / (count - FEW)
     return OpenSimRun(errors, per_frame, printed["version"])
+
+
+def opensim_model(person: Person, joint_family: str) -> str:
+    """The model that `bsip export` writes; of the other family with ball and free joints."""
+    body = IdentifiedPerson(person, regress(person, "M", 70.0).inertias, "person", "RM", ())
+    document = ET.fromstring(osim_text(body))
+    for joint in document.findall(".//CustomJoint") if joint_family == "ball" else ():
+        joint.tag = "FreeJoint" if len(joint.findall("coordinates/*")) == 6 else "BallJoint"
+        joint[:] = [part for part in joint if part.tag != "SpatialTransform"]
+    return ET.tostring(document, encoding="unicode")
+
+
+def trc_text(labels: tuple[str, ...], markers_m: np.ndarray, rate_hz: float) -> str:
+    """A .trc file of markers (N, m, 3) [m], turned from Z up to Y up as OpenSim has it."""
+    count, width = markers_m.shape[:2]
+    turned = (markers_m[..., [0, 2, 1]] * [1.0, 1.0, -1.0]).reshape(count, -1)
+    head = {"DataRate": rate_hz, "CameraRate": rate_hz, "NumFrames": count, "NumMarkers": width}
+    head |= {"Units": "m", "OrigDataRate": rate_hz, "OrigDataStartFrame": 1, "OrigNumFrames": count}
+    lines = ["PathFileType\t4\t(X/Y/Z)\tmarkers.trc", "\t".join(head)]
+    lines += ["\t".join(map(str, head.values())), "Frame#\tTime\t" + "\t\t\t".join(labels)]
+    lines += ["\t\t" + "\t".join(f"{a}{k + 1}" for k in range(width) for a in "XYZ"), ""]
+    for k, row in enumerate(turned):
+        lines.append("\t".join([str(k + 1), *(f"{x:.12f}" for x in (k / rate_hz, *row))]))
+    return "\n".join([*lines, ""])
 
 
 def storage_column(path: Path, name: str) -> np.ndarray:
@@ -104,27 +140,48 @@ def optimum_column(ours: np.ndarray, theirs: np.ndarray) -> list[str]:
     ]
 
 
+def pinocchio_loop(person: Person, markers_m: np.ndarray, q_first: np.ndarray) -> np.ndarray:
+    """(N, nq) least-squares poses by Gauss-Newton over Pinocchio's calls, each from the last.
+
+    One call per step fills Pinocchio's Jacobian of all joints; the markers' columns follow from
+    it by whole-array numpy. It stops at the kernel's criterion: a gain of 1e-9 of the cost.
+    """
+    model = pinocchio_model(person)
+    data = model.createData()
+    joints = [int(j) + 1 for j in person.marker_segments]
+    local = person.markers_in_joint_m()
+    sizes = {"free": 6, "spherical": 3, "revolute": 1}
+    counts = [sizes[kind] for kind in person.skeleton.joint_types]
+    moves = np.repeat(subtrees(person), counts, axis=0).T[..., None]  # whether v moves a marker
+    out = np.empty((len(markers_m), model.nq))
+    q = q_first
+    for frame, measured in enumerate(markers_m):
+        cost = np.inf
+        for _ in range(STEPS):
+            pin.computeJointJacobians(model, data, q)
+            placements = [data.oMi[j] for j in range(model.njoints)]
+            R = np.array([placement.rotation for placement in placements])[joints]
+            p = np.array([placement.translation for placement in placements])[joints]
+            places = p + np.einsum("mij,mj->mi", R, local)
+            apart = measured - places
+            before, cost = cost, 0.5 * float((apart**2).sum())
+            if before - cost <= 1e-9 * cost:
+                break
+            J = data.J
+            columns = (J[:3].T[None] + np.cross(J[3:].T[None], places[:, None])) * moves
+            flat = np.swapaxes(columns, 1, 2).reshape(-1, model.nv)
+            normal = flat.T @ flat
+            normal[np.diag_indices_from(normal)] += 1e-12
+            q = pin.integrate(model, q, np.linalg.solve(normal, flat.T @ apart.ravel()))
+        out[frame] = q
+    return out
+
+
 def forward_difference(person: Person, count: int) -> float:
     """Largest difference [1 and m] of forward kinematics to Pinocchio's at random poses."""
-    model = pinocchio_model(person)
-    data, rng = model.createData(), np.random.default_rng(3)
-    spread = np.where(np.arange(model.nv) < 3, 0.7, 1.0)
-    start = standing(person)
-    q = np.stack(
-        [pin.integrate(model, start, rng.normal(0, 1, model.nv) * spread) for _ in range(count)]
-    )
-    R, p = tree_of(person).forward(q)
-    worst = 0.0
-    for k in range(count):
-        pin.forwardKinematics(model, data, q[k])
-        for i in range(model.njoints - 1):
-            placement = data.oMi[i + 1]
-            worst = max(
-                worst,
-                np.abs(placement.rotation - R[k, i]).max(),
-                np.abs(placement.translation - p[k, i]).max(),
-            )
-    return float(worst)
+    q = random_poses(person, count, 1.0, seed=3)
+    pairs = zip(tree_of(person).forward(q), joint_frames(person, q), strict=True)
+    return max(float(np.abs(ours - theirs).max()) for ours, theirs in pairs)
 
 
 def rms_of(person: Person, q: np.ndarray, markers_m: np.ndarray) -> np.ndarray:
@@ -150,7 +207,7 @@ def compile_rows() -> list[list[str]]:
     command = [sys.executable, "-m", "benchmarks.inverse_kinematics", "--first-call"]
     with tempfile.TemporaryDirectory() as cache:
         for label in ("first solve, empty cache", "first solve, cached"):
-            used = run_child(command, {"NUMBA_CACHE_DIR": cache}, ROOT)
+            used = run_child(command, {"NUMBA_CACHE_DIR": cache})
             first, second = json.loads(used.stdout.splitlines()[-1])
             rows.append([label, f"{first - second:.2f}"])
     return rows
@@ -199,7 +256,7 @@ def compare(options: argparse.Namespace) -> None:
 
     def loop() -> float:
         def work() -> None:
-            looped[:] = [pinocchio_loop.solve(person, some, q[0])]
+            looped[:] = [pinocchio_loop(person, some, q[0])]
 
         return cpu_seconds(work) / len(some)
 
@@ -210,7 +267,7 @@ def compare(options: argparse.Namespace) -> None:
 
     contestants = {"bsip": kernel, "Pinocchio in a Python loop": loop}
     if options.opensim_python:
-        for family in opensim_model.JOINTS:
+        for family in JOINTS:
             contestants[f"OpenSim, {family} joints"] = partial(opensim, family)
     seconds = interleaved(contestants, options.rounds)
     print(

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.measure import RESULTS, machine, markdown, write_csv
-from benchmarks.participant import run_stage
+from benchmarks.measure import RESULTS, bsip, machine, markdown, write_csv
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import load_skeleton
@@ -75,9 +74,9 @@ def errors_of(study: Path, people: int) -> Iterator[dict]:
     unrefined = study / "unrefined.toml"
     unrefined.write_text("[scale]\niterations = 0\n")
     for name, out in outs.items():
-        extra = ("--config", str(unrefined)) if name == "regression" else ()
-        run_stage("ingest", study, out, *extra)
-        run_stage("scale", study, out, *extra)
+        extra = ("--config", unrefined) if name == "regression" else ()
+        for stage in ("ingest", "scale"):
+            bsip(stage, study, "--out", out, *extra)
     for number in range(1, people + 1):
         sub = f"sub-{number:02d}"
         truth = Truth(json.loads((study / "truth" / f"{sub}_truth.json").read_text())["person"])

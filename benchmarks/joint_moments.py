@@ -23,11 +23,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S
-from bsip_cli.simulate.numerics import derivative
 from bsip_cli.simulate.options import PRESETS, StudyOptions
+from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import GRAVITY
 from bsip_cli.simulate.recording import Trial, simulate_trial
 from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
+from tests.dynamics.newton_euler import driving_wrench, joint_axes
 
 STEP_S = 1e-3
 SIGMA_S = np.sqrt(np.log(2)) / (2 * np.pi * 10.0)  # of joints.cutoff_hz, half of the power
@@ -128,34 +129,23 @@ def _compared(
     return rows
 
 
-def _true_moments(person, trial: Trial, kind: str, side: str) -> np.ndarray:
+def _true_moments(person: Person, trial: Trial, kind: str, side: str) -> np.ndarray:
     """(T, 3) about the axes of the joint."""
-    force, moment = np.zeros((2, len(trial.time_s), 3))
+    poses, wrench = trial.poses, np.zeros((len(trial.time_s), 6))
     for part in LIMBS[kind]:
         body = f"{part}_{side}"
-        inertia, R = person.inertias[body], trial.poses.rotation[body]
-        com = trial.poses.point(body, inertia.com_m)
-        spin = derivative(R, STEP_S) @ R.swapaxes(1, 2)
-        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-        turned = R @ inertia.tensor_kgm2 @ R.swapaxes(1, 2)
-        linear = inertia.mass_kg * derivative(com, STEP_S)
-        angular = np.cross(com, linear) + (turned @ w[..., None])[..., 0]
-        weight = inertia.mass_kg * GRAVITY
-        force += derivative(linear, STEP_S) - weight
-        moment += derivative(angular, STEP_S) - np.cross(com, weight)
+        inertia, R = person.inertias[body], poses.rotation[body]
+        moved = poses.point(body, inertia.com_m), inertia.mass_kg, inertia.tensor_kgm2
+        wrench += driving_wrench(R, *moved, GRAVITY, STEP_S)
     if "foot" in LIMBS[kind]:
-        ground_force, ground_moment = trial.feet_wrenches(apart=True)[side]
-        force, moment = force - ground_force, moment - ground_moment
+        wrench -= np.hstack(trial.feet_wrenches(apart=True)[side])
     own = f"{LIMBS[kind][0]}_{side}"
     above = "thorax" if kind == "shoulder" else PROXIMAL[kind]
-    above = above if above in trial.poses.rotation else f"{above}_{side}"
-    moment = moment - np.cross(trial.poses.origin_m[own], force)
+    above = above if above in poses.rotation else f"{above}_{side}"
+    moment = wrench[:, 3:] - np.cross(poses.origin_m[own], wrench[:, :3])
     sign = -1.0 if side == "l" else 1.0
-    first = trial.poses.rotation[above][:, :, 2]
-    third = sign * trial.poses.rotation[own][:, :, 1]
-    second = np.cross(third, first)
-    second /= np.linalg.norm(second, axis=1, keepdims=True)
-    return np.stack([np.einsum("nc,nc->n", moment, e) for e in (first, second, third)], axis=1)
+    axes = joint_axes(poses.rotation[above], poses.rotation[own], sign)
+    return np.einsum("nc,nkc->nk", moment, axes)
 
 
 if __name__ == "__main__":

@@ -19,13 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.measure import ROOT, markdown, run_child
+from benchmarks.measure import bsip, markdown
 from bsip_cli.artifacts import read_artifact
 
 LOADS = {2: ("forearm_r", 0.5), 3: ("shank_r", 1.0), 4: ("upper_torso", 2.0)}  # by run
 PLAIN_RUN, AGAIN_RUN = 1, 5
 ONE, TWO = "loaded segments", "two identifications"
-BAD_DATA = 3  # some trial was refused, the rest is done
 
 
 @dataclass(frozen=True)
@@ -46,11 +45,6 @@ class Compared:
 
 
 # --- the recordings and comparisons -------------------------------------------------------------
-
-
-def bsip(*arguments: object) -> None:
-    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-    run_child(command, folder=ROOT, allowed=BAD_DATA)
 
 
 def record(folder: Path, seed: int, duration_s: float, run: int) -> list[float]:

@@ -29,14 +29,7 @@ from bsip_cli.simulate.effects.loads import Support, UnmeasuredContact
 from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person, draw_person
-from bsip_cli.simulate.plan import (
-    Plan,
-    add_breath_of_motion,
-    add_squat,
-    add_sway,
-    plate_under,
-    sketch_for,
-)
+from bsip_cli.simulate.plan import Plan, add_squat, moved_a_little, plate_under, sketch_for
 from bsip_cli.simulate.recording import (
     THIN,
     Trial,
@@ -114,8 +107,7 @@ def sitting(
     sketch = sketch_for(person, duration_s)
     down = window(sketch.t_s, start_s, end_s, 0.9)
     add_squat(sketch, down, 0.24 * person.stature_m)
-    add_breath_of_motion(sketch, rng, np.deg2rad(0.3))
-    add_sway(sketch, rng, 0.4)
+    moved_a_little(sketch, rng, 0.3, 0.4)
     borne = window(sketch.t_s, start_s + 0.6, end_s - 0.6, 0.3) * rng.uniform(0.6, 0.85)
     force = person.mass_kg * G * borne[:, None] * np.array([0.0, 1.0, 0.0])
     seat = Support(body_of("lower_torso"), np.zeros(3), force)
@@ -216,28 +208,21 @@ HEADER = (
 )
 
 
-def rows_of(answers: list[Answer]) -> list[tuple]:
-    by_kind = [_row(kind, [one for one in answers if one.kind == kind]) for kind in KINDS]
-    return [*by_kind, _row("all", answers)]
+def rows_of(answers: list[Answer]) -> list[list[str]]:
+    by_kind = {kind: [one for one in answers if one.kind == kind] for kind in KINDS}
+    return [_row(kind, some) for kind, some in (by_kind | {"all": answers}).items()]
 
 
-def _row(kind: str, answers: list[Answer]) -> tuple:
+def _row(kind: str, answers: list[Answer]) -> list[str]:
     known = [one for one in answers if one.told.is_known]
-    unknown = f"{100 * (1 - len(known) / len(answers)):.0f}"
-    if not known:
-        return (kind, len(answers), 0, "-", "-", "-", unknown)
-    covered = 100 * np.mean([one.is_covered for one in known])
-    width = np.median([one.told.half_width_percent for one in known])
-    worst = max(abs(one.error_percent) for one in known)
-    return (
-        kind,
-        len(answers),
-        len(known),
-        f"{covered:.0f}",
-        f"{width:.1f}",
-        f"{worst:.1f}",
-        unknown,
-    )
+    cells = ["-"] * 3
+    if known:
+        covered = 100 * np.mean([one.is_covered for one in known])
+        width = np.median([one.told.half_width_percent for one in known])
+        worst = max(abs(one.error_percent) for one in known)
+        cells = [f"{covered:.0f}", f"{width:.1f}", f"{worst:.1f}"]
+    unknown = 100 * (1 - len(known) / len(answers))
+    return [kind, f"{len(answers)}", f"{len(known)}", *cells, f"{unknown:.0f}"]
 
 
 def main() -> None:

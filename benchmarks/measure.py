@@ -16,6 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
+BAD_DATA = 3  # some trial was refused, the rest is done
 
 # A child's peak memory begins with its parent's: a parent of a few MB in between.
 _LIGHT_PARENT = """
@@ -57,15 +58,12 @@ def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> 
 def run_child(
     arguments: Sequence[str],
     environment: Mapping[str, str] | None = None,
-    folder: Path | None = None,
+    folder: Path = ROOT,
     allowed: int = 0,
 ) -> Usage:
     """Run a process in a folder to its end.
 
-    Raises
-    ------
-    RuntimeError
-        Its exit code is negative or above ``allowed``.
+    RuntimeError: its exit code is neither 0 nor ``allowed``.
     """
     done = subprocess.run(
         [sys.executable, "-I", "-S", "-c", _LIGHT_PARENT, *arguments],
@@ -77,9 +75,14 @@ def run_child(
     )
     *printed, last = done.stdout.splitlines()
     code, cpu_s, peak_mb = json.loads(last)
-    if not 0 <= code <= allowed:
+    if code not in (0, allowed):
         raise RuntimeError(f"{' '.join(arguments)} ended with {code}\n{done.stderr}")
     return Usage(cpu_s, peak_mb, "\n".join(printed), done.stderr, code)
+
+
+def bsip(*arguments: object) -> Usage:
+    """Run a command of bsip, which may refuse some trials. Errors as of `run_child`."""
+    return run_child([sys.executable, "-m", "bsip_cli", *map(str, arguments)], allowed=BAD_DATA)
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

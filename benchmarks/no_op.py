@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import argparse
 import shutil
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.measure import bsip
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.session import open_study
@@ -35,13 +34,11 @@ OPTIONS = StudyOptions(
 )
 
 
-def bsip(*arguments: object) -> tuple[float, str]:
+def timed(*arguments: object) -> tuple[float, str]:
     """Seconds of a call, and its last line."""
     began = time.monotonic()
-    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    lines = (done.stderr or done.stdout).splitlines()
-    return time.monotonic() - began, lines[-1]
+    used = bsip(*arguments)
+    return time.monotonic() - began, (used.stderr or used.stdout).splitlines()[-1]
 
 
 def copy_recordings(study: Path, people: int) -> None:
@@ -94,13 +91,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         study, made, out = (Path(folder) / name for name in ("study", "made", "out"))
         simulate_study(study, OPTIONS)
-        print(bsip("run", study, "--out", made, "--participant", "sub-01")[1])
+        print(timed("run", study, "--out", made, "--participant", "sub-01")[1])
         copy_recordings(study, asked.people)
         copy_results(study, out, made)
-        start_s, _ = bsip("info")
+        start_s, _ = timed("info")
         print(f"{start_s:6.1f} s  bsip info")
         for more in ([], [], [], ["--verify"]):
-            seconds, last = bsip("run", study, "--out", out, "--jobs", asked.jobs, *more)
+            seconds, last = timed("run", study, "--out", out, "--jobs", asked.jobs, *more)
             print(f"{seconds:6.1f} s  bsip run {' '.join(more)}  ({last.split(';')[0]})")
 
 

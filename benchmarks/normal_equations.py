@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
+from benchmarks.measure import cpu_seconds, interleaved, machine, markdown, run_child
 from benchmarks.moving_person import movement, sample_person
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
@@ -83,8 +83,7 @@ def memory_table(durations_s: list[float]) -> str:
     for duration in durations_s:
         child = [sys.executable, "-m", "benchmarks.normal_equations", "--memory", f"{duration}"]
         plain, traced = (
-            json.loads(run_child([*child, *extra], folder=ROOT).stdout)
-            for extra in ([], ["traced"])
+            json.loads(run_child([*child, *extra]).stdout) for extra in ([], ["traced"])
         )
         rows.append([f"{duration:g}", f"{plain[0]:.0f}", f"{plain[1]:.0f}", f"{traced[2]:.1f}"])
     header = ["trial [s]", "recording itself [MB]", "growth of peak RSS [MB]", "traced peak [MB]"]

@@ -1,57 +1,57 @@
-"""What bsip makes of real recordings: marker residuals, and errors of RM and OM.
+"""What bsip makes of real recordings: markers, errors of RM and OM, balance of forces, faults.
 
     python -m benchmarks.recordings DATA --write
 
-DATA is a folder with the recordings listed in STUDIES; those that are missing are left out.
+DATA is a folder with the recordings listed in STUDIES; those that are missing are left out. With
+--folder studies and results stay there, and only what has changed since is done again.
 """
 
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from benchmarks.measure import RESULTS, markdown, write_csv
+from benchmarks.measure import RESULTS, bsip, markdown, write_csv
 from bsip_cli.statistics.methods import METHODS
 from tests.real.figaroh_csv import convert
 
 
 @dataclass(frozen=True)
 class Source:
-    """One data set as a study of one person: rows of participants.tsv, options, files."""
+    """One data set as a study of one person: rows of participants.tsv, options, files.
+
+    fitted, diagnosed : whether it is in the tables of markers and errors, of forces and faults.
+    """
 
     name: str
     person: str  # sex, mass_kg, height_m
     options: str
     files: dict[str, str]  # task: recording, without its ending for TRC with MOT
+    fitted: bool = True
+    diagnosed: bool = True
 
 
+_OPENCAP = {
+    "static": "opencap_subject4/static1",
+    "squats": "opencap_subject4/squats1",
+    "dropjump": "opencap_subject4/DJ1",
+    "dropjumptwo": "opencap_subject4/DJ2",
+    "sitstand": "opencap_subject4/STS1",
+    "walking": "opencap_subject4/walking1",
+}
+_FEW = {task: _OPENCAP[task] for task in ("static", "squats", "sitstand")}
+_OF_OPENCAP = (
+    "opencap_subject4",
+    "M\t62.6\t1.68",
+    '[roles]\nsequence = ["squats"]\n[identify]\nhold_out_fraction = 0.4\n',
+)
 STUDIES = (
-    Source(
-        "opencap_subject4",
-        "M\t62.6\t1.68",
-        '[roles]\nsequence = ["squats"]\n[identify]\nhold_out_fraction = 0.4\n',
-        {
-            "static": "opencap_subject4/static1",
-            "squats": "opencap_subject4/squats1",
-            "dropjump": "opencap_subject4/DJ1",
-            "dropjumptwo": "opencap_subject4/DJ2",
-            "sitstand": "opencap_subject4/STS1",
-            "walking": "opencap_subject4/walking1",
-        },
-    ),
-    Source(
-        "figaroh_human",
-        "M\tn/a\tn/a",
-        "[identify]\nhold_out_fraction = 0.4\nblock_s = 5.0\n",
-        {"sequence": "figaroh_human/Trial03.csv"},
-    ),
     Source(
         "biobuddy_ech",
         "M\tn/a\tn/a",
@@ -61,6 +61,14 @@ STUDIES = (
             "righthip": "biobuddy_ech/right_hip.c3d",
             "rightknee": "biobuddy_ech/right_knee.c3d",
         },
+    ),
+    Source(*_OF_OPENCAP, _OPENCAP, diagnosed=False),
+    Source(*_OF_OPENCAP, _FEW, fitted=False),
+    Source(
+        "figaroh_human",
+        "M\tn/a\tn/a",
+        "[identify]\nhold_out_fraction = 0.4\nblock_s = 5.0\n",
+        {"sequence": "figaroh_human/Trial03.csv"},
     ),
     Source(
         "btk_pig (Full)",
@@ -85,45 +93,88 @@ STUDIES = (
         "M\t80\tn/a",
         "",
         {"serve": "ktk_walk_and_serve/kinematics_tennis_serve.c3d"},
+        diagnosed=False,
+    ),
+    Source(
+        "return11_static",
+        "F\t58.35\t1.60",
+        "",
+        {"static": "return11_static/c3dfile1.c3d"},
+        fitted=False,
+    ),
+    Source(
+        "hamner_other",
+        "M\tn/a\tn/a",
+        "",
+        {"runa": "hamner_other/run200", "runb": "hamner_other/run300"},
+        fitted=False,
+    ),
+    Source(
+        "motionanalysis_helenhayes",
+        "M\tn/a\tn/a",
+        "",
+        {"jump": "motionanalysis_helenhayes/Sample_Jump2.c3d"},
+        fitted=False,
     ),
 )
 
-_STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct")
-_COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
+_FITTING = ("ingest", "scale", "ik", "regress", "identify", "reconstruct")
+_DIAGNOSING = ("diagnose", "extend")
+_FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
+_COMPONENTS = (*_FORCES, "cop_ap", "cop_ml")
+_G = 9.81
+Row = dict[str, str]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
+    parser.add_argument("--folder", type=Path, help="keep studies and results here")
     parser.add_argument("--write", action="store_true", help="into docs/results")
     arguments = parser.parse_args()
-    for name, rows in tables(arguments.data).items():
-        header = list(rows[0]) if rows else []
-        cells = [list(row.values()) for row in rows]
-        print(markdown(header, cells) if rows else "No recordings were found.", end="\n\n")
+    with tempfile.TemporaryDirectory() as scratch:
+        found = tables(arguments.data, arguments.folder or Path(scratch))
+    for name, rows in found.items():
+        header, cells = [*rows[0]] if rows else [], [[*row.values()] for row in rows]
+        print(f"{name}\n\n{markdown(header, cells) if rows else 'No recordings found.'}\n")
         if arguments.write and rows:
             write_csv(RESULTS / f"{name}.csv", header, cells)
 
 
-def tables(data: Path) -> dict[str, list[dict[str, str]]]:
-    """By file name a table of markers and one of forces."""
-    markers: list[dict[str, str]] = []
-    forces: list[dict[str, str]] = []
-    with tempfile.TemporaryDirectory() as scratch:
-        for k, source in enumerate(STUDIES):
-            study = Path(scratch) / f"study{k}"
-            if not make_study(study, data, source):
-                continue
-            out = run(study)
-            markers += marker_rows(source.name, out)
-            forces += force_rows(source.name, out)
-    return {"real_markers": markers, "real_forces": forces}
+def tables(data: Path, folder: Path) -> dict[str, list[Row]]:
+    """By file name: markers, errors of the methods, faults, and the balance of forces."""
+    markers, errors, faults, balance = (list[Row]() for _ in range(4))
+    for k, source in enumerate(STUDIES):
+        study, out = folder / f"study{k}", folder / f"study{k}_out"
+        if not make_study(study, data, source):
+            continue
+        stages = (*_FITTING, *_DIAGNOSING) if source.diagnosed else _FITTING
+        said = [line for stage in stages for line in _said(stage, study, out)]
+        person = out / "sub-01"
+        if source.fitted:
+            markers += marker_rows(source.name, person)
+            errors += error_rows(source.name, person)
+        if source.diagnosed:
+            faults += fault_rows(source.name, person, said)
+            balance += balance_rows(source.name, person)
+    return {
+        "real_markers": markers,
+        "real_forces": errors,
+        "real_diagnosis": faults,
+        "real_balance": balance,
+    }
+
+
+def _said(stage: str, study: Path, out: Path) -> list[str]:
+    """Run a stage; its warnings."""
+    lines = bsip(stage, study, "--out", out).stderr.splitlines()
+    return [line for line in lines if line.startswith(f"{stage}:")]
 
 
 def make_study(study: Path, data: Path, source: Source) -> bool:
     """Write the study; False if a recording is missing."""
     folder = study / "sub-01"
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     for task, name in source.files.items():
         target = folder / f"sub-01_task-{task}"
         if name.endswith(".csv"):
@@ -148,18 +199,12 @@ def make_study(study: Path, data: Path, source: Source) -> bool:
     return True
 
 
-def run(study: Path) -> Path:
-    """Run the stages up to the reconstruction; return the participant's folder."""
-    out = study.with_name(f"{study.name}_out")
-    for stage in _STAGES:
-        command = [sys.executable, "-m", "bsip_cli", stage, str(study), "--out", str(out)]
-        subprocess.run(command, check=False, capture_output=True)
-    return out / "sub-01"
+def _task(trial: str) -> str:
+    return trial.partition("_task-")[2]
 
 
-def marker_rows(name: str, out: Path) -> list[dict[str, str]]:
+def marker_rows(name: str, out: Path) -> Iterator[Row]:
     """Marker residuals of each trial [mm]."""
-    rows = []
     for path in sorted(out.glob("*_kinematics.parquet")):
         stem = path.name.removesuffix("_kinematics.parquet")
         kinematics = pd.read_parquet(path)
@@ -167,39 +212,114 @@ def marker_rows(name: str, out: Path) -> list[dict[str, str]]:
         squares = residuals.assign(square=residuals["residual_m"] ** 2).groupby("marker")["square"]
         rms = 1000 * np.sqrt(squares.mean()).sort_values(ascending=False)
         worst = ", ".join(f"{label} {value:.0f}" for label, value in rms.head(3).items())
-        rows.append(
-            {
-                "data set": name,
-                "trial": stem.split("task-")[1],
-                "frames": str(len(kinematics)),
-                "with a pose": f"{100 * kinematics['determined'].mean():.0f} %",
-                "median marker [mm]": f"{rms.median():.1f}",
-                "all markers [mm]": f"{1000 * np.sqrt((residuals['residual_m'] ** 2).mean()):.1f}",
-                "worst markers [mm]": worst,
-            }
-        )
-    return rows
+        yield {
+            "data set": name,
+            "trial": _task(stem),
+            "frames": str(len(kinematics)),
+            "with a pose": f"{100 * kinematics['determined'].mean():.0f} %",
+            "median marker [mm]": f"{rms.median():.1f}",
+            "all markers [mm]": f"{1000 * np.sqrt((residuals['residual_m'] ** 2).mean()):.1f}",
+            "worst markers [mm]": worst,
+        }
 
 
-def force_rows(name: str, out: Path) -> list[dict[str, str]]:
+def error_rows(name: str, out: Path) -> Iterator[Row]:
     """RMSE of RM, RM+mass and OM in each trial with measured forces."""
-    rows = []
     for path in sorted(out.glob("*_fit.parquet")):
         fit = pd.read_parquet(path)
         if not len(fit) or not (fit["n"] > 0).any():
             continue
         rmse = fit.pivot(index="component", columns="method", values="rmse")
-        row = {
+        methods = [method for method in METHODS if method in rmse]
+        yield {
             "data set": name,
-            "trial": path.name.split("task-")[1].removesuffix("_fit.parquet"),
+            "trial": _task(path.name.removesuffix("_fit.parquet")),
             "data": str(fit["data"].iloc[0]).replace("_", " "),
             "samples": str(int(fit["n"].max())),
+        } | {c: " / ".join(f"{x:.1f}" for x in rmse.loc[c, methods]) for c in _COMPONENTS}
+
+
+def balance_rows(name: str, out: Path) -> Iterator[Row]:
+    """Mean forces over the frames with every contact measured: measured, and simulated by RM."""
+    axes = ["fx_N", "fy_N", "fz_N"]
+    for path in sorted(out.glob("*_reconstruction.parquet")):
+        table = pd.read_parquet(path)
+        table = table[table["valid"]]
+        means = table.groupby("method")[axes].mean()
+        if "measured" not in means.index:
+            continue
+        measured = means.loc["measured"]
+        simulated = means.loc["RM"] if "RM" in means.index else measured
+        times = table.loc[table["method"] == "measured", "time_s"].to_numpy()
+        yield {
+            "recording": name,
+            "trial": _task(path.name.removesuffix("_reconstruction.parquet")),
+            "time [s]": f"{len(times) * np.median(np.diff(times)):.1f}",
+            **{f"{axis[:2]} [N]": f"{measured[axis]:.1f} / {simulated[axis]:.1f}" for axis in axes},
+            "fz / g [kg]": f"{measured['fz_N'] / _G:.2f}",
         }
-        for component in _COMPONENTS:
-            values = [f"{rmse.loc[component, m]:.1f}" for m in METHODS if m in rmse]
-            row[component] = " / ".join(values)
-        rows.append(row)
-    return rows
+
+
+# --- faults ---------------------------------------------------------------------------------------
+
+
+def fault_rows(name: str, out: Path, said: list[str]) -> Iterator[Row]:
+    """What is named or in a group, each with its size, and what correcting it gains."""
+
+    def row(*cells: str) -> Row:
+        return dict(zip(_OF_FAULTS, (name, *cells, *[""] * 6), strict=False))
+
+    file = out / "sub-01_diagnosis.parquet"
+    if not file.exists():
+        yield row(f"not diagnosed: {said[0] if said else 'no diagnosis'}")
+        return
+    table = pd.read_parquet(file)
+    found = table[(table["verdict"] != "rejected") & (table["effect"] != "none")]
+    if found.empty and "no movement can be diagnosed" in " ".join(said):
+        yield row("not diagnosed: no trial has motion with every contact on a plate")
+    elif found.empty:
+        yield row("nothing wrong above the noise")
+    alone = found["rank"].astype(str)
+    group = found["class_id"].where(found["class_id"].fillna("") != "", alone)
+    for _, alike in found.sort_values("rank", kind="stable").groupby(group, sort=False):
+        for k, (_, one) in enumerate(alike.groupby("rank")):
+            first = one.iloc[0]
+            gain, p = first["gain_percent"], first["p_value"]
+            yield row(
+                "or " * bool(k) + f"`{first['effect']}` {first['target'] or ''}".strip(),
+                "; ".join(
+                    map(_size, one["parameter"], one["estimate"], one["ci_low"], one["ci_high"])
+                ),
+                ", ".join(map(_task, first["trials"].split(", "))),
+                "" if np.isnan(p) else "> 0.999" if p < 1e-3 else f"{1 - p:.3f}",
+                "" if np.isnan(gain) else f"{gain:.1f}",
+                "" if k else _gains(out / "sub-01_gain.parquet"),
+            )
+
+
+_OF_FAULTS = (
+    "recording",
+    "cause",
+    "size in SI units (95 % interval)",
+    "trials",
+    "probability",
+    "held-out gain of the diagnosis [%]",
+    "held-out gain by `extend`, all causes [%]",
+)
+
+
+def _size(parameter: str, value: float, low: float, high: float) -> str:
+    interval = "" if np.isnan(low) or low == high else f" ({low:.3g} to {high:.3g})"
+    return f"{parameter} {value:.3g}{interval}"
+
+
+def _gains(file: Path) -> str:
+    """Of each component, by all causes together: they come last."""
+    if not file.exists():
+        return ""
+    table = pd.read_parquet(file)
+    gains = dict(zip(table["component"], table["gain_percent"], strict=True))
+    return ", ".join(f"{c} {gains[c]:+.0f}" for c in _FORCES if c in gains)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.measure import machine, markdown
-from benchmarks.participant import run_stage, study_options
+from benchmarks.measure import bsip, machine, markdown
+from benchmarks.participant import study_options
 from bsip_cli.simulate.study import simulate_study
 
 SEED = 2017
@@ -28,7 +28,7 @@ def measured(study: Path, out: Path, jobs: int) -> tuple[float, float, float]:
     """Seconds of the clock, CPU-seconds and MB of the largest process, from nothing."""
     shutil.rmtree(out, ignore_errors=True)
     began = time.monotonic()
-    usage = run_stage("run", study, out, "--jobs", str(jobs))
+    usage = bsip("run", study, "--out", out, "--jobs", jobs)
     return time.monotonic() - began, usage.cpu_s, usage.peak_mb
 
 

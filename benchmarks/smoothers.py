@@ -9,12 +9,12 @@ are mean RMSE of OM over the trials (static ones aside) that did not identify it
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import pandas as pd
+
+from benchmarks.measure import bsip, markdown
 
 SMOOTHERS = {
     "spline": 'method = "spline"',
@@ -31,7 +31,8 @@ def main() -> None:
     parser.add_argument("studies", type=Path, nargs="+")
     for study in parser.parse_args().studies:
         print(f"\n**{study.name}**: RMSE of OM on unseen data (N, N m, mm)\n")
-        print(table(compare(study)))
+        rows = [[name, *map("{:.1f}".format, errors)] for name, errors in compare(study).items()]
+        print(markdown(["smoother", *_COMPONENTS], rows))
 
 
 def compare(study: Path) -> dict[str, pd.Series]:
@@ -50,9 +51,7 @@ def compare(study: Path) -> dict[str, pd.Series]:
 
 def run(study: Path, out: Path, options: Path, stages: tuple[str, ...]) -> None:
     for stage in stages:
-        command = [sys.executable, "-m", "bsip_cli", stage, str(study), "--out", str(out)]
-        command += ["--config", str(options), "--jobs", "2"]
-        subprocess.run(command, check=True, capture_output=True)
+        bsip(stage, study, "--out", out, "--config", options, "--jobs", 2)
 
 
 def held_out(out: Path) -> pd.Series:
@@ -64,13 +63,6 @@ def held_out(out: Path) -> pd.Series:
     joined = pd.concat(tables)
     unseen = joined[(joined["data"] == "held_out") & (joined["method"] == "OM")]
     return unseen.groupby("component")["rmse"].mean()[_COMPONENTS]
-
-
-def table(found: dict[str, pd.Series]) -> str:
-    lines = ["| smoother | " + " | ".join(_COMPONENTS) + " |", "|---|" + "---|" * len(_COMPONENTS)]
-    for name, errors in found.items():
-        lines.append(f"| {name} | " + " | ".join(f"{value:.1f}" for value in errors) + " |")
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

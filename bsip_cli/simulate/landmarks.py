@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bsip_cli.segments import without_side
 from bsip_cli.simulate.options import Richness
 
 ASIS_FROM_LUMBAR = {"M": (0.335, 0.032, 0.5), "F": (0.340, -0.049, 0.5)}  # pelvis widths
@@ -104,11 +105,6 @@ class Build:
     hinges: dict[str, np.ndarray]
 
 
-def kind_of(body: str) -> str:
-    """A body's name without its side."""
-    return body.removesuffix("_l").removesuffix("_r")
-
-
 def heel_and_toe_m(foot_length_m: float) -> tuple[float, float]:
     """X of the heel and of the metatarsal heads from the ankle joint, foot flat."""
     return -0.27 * foot_length_m, 0.73 * foot_length_m
@@ -164,12 +160,12 @@ def _skin_markers(
         error = richness.placement_error_m * rng.standard_normal(3)
         own = rng.standard_normal((3, 6))
         lag = 1.5e-4 * np.exp(0.3 * rng.standard_normal())
-        size, _ = SKIN_SIZE_M.get(kind_of(body), OTHER_SKIN_SIZE_M)
+        size, _ = SKIN_SIZE_M.get(without_side(body), OTHER_SKIN_SIZE_M)
         gain = richness.soft_tissue * size * (0.8 * sliding[body] + 0.6 * own) / np.sqrt(3.0)
         lag *= richness.soft_tissue * min(size / 0.007, 1.0)
         markers[label] = Marker(body, position + error, np.hstack([gain, 0.0 * gain]), lag, 0.0)
     for label, marker in markers.items() if richness.measured_tissue else ():
-        usual, size = SKIN_SIZE_M.get(kind_of(marker.body), OTHER_SKIN_SIZE_M)
+        usual, size = SKIN_SIZE_M.get(without_side(marker.body), OTHER_SKIN_SIZE_M)
         straight = marker.skin_gain_m[:, :6] * size / usual
         curved = CURVED_SHARE * richness.soft_tissue * size * rng.standard_normal((3, 6))
         gain = np.hstack([straight, curved / np.sqrt(3.0)])

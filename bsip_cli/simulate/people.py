@@ -15,13 +15,12 @@ from importlib.resources import files
 
 import numpy as np
 
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import SEGMENTS, without_side
 from bsip_cli.simulate.landmarks import (
     Build,
     Marker,
     Swing,
     draw_tissue,
-    kind_of,
     place_markers,
     with_girdle,
 )
@@ -257,14 +256,18 @@ def _draw_inertias(
     common = {name: _factor(rng, scale * MASS_SPREAD.get(name, 0.11)) for name in mean}
     masses = {}
     for body in BODIES:
-        kind = kind_of(body)
+        kind = without_side(body)
         own = _factor(rng, 0.03 * scale) if kind != body else 1.0
         masses[body] = mean[kind].mass_percent * common[kind] * own
     total = sum(masses.values())
     trunk = mean["thorax"].length_m + mean["abdomen"].length_m
     inertias = {}
     for body in BODIES:
-        kind, row, own_mass = kind_of(body), mean[kind_of(body)], mass * masses[body] / total
+        kind, row, own_mass = (
+            without_side(body),
+            mean[without_side(body)],
+            mass * masses[body] / total,
+        )
         # the pelvis' own length follows the trunk's
         pelvis = row.length_m * lengths["upper_torso"] / trunk
         length = pelvis if body == "lower_torso" else lengths[body]

@@ -11,10 +11,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.instruments.readings import Instruments, SensingPlate
+from bsip_cli.segments import without_side
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing, kind_of
+from bsip_cli.simulate.landmarks import Marker, Swing
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
@@ -205,7 +206,7 @@ def marker_paths(
 def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
     """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
     own, side = poses.rotation[marker.body], marker.body[-2:]
-    first, second = (name.replace("*", side) for name in NEIGHBOURS[kind_of(marker.body)])
+    first, second = (name.replace("*", side) for name in NEIGHBOURS[without_side(marker.body)])
     bodies = (first, MOVED_BY_THE_ARM.get(label, second))
     turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
     sines = np.concatenate(turns, axis=1)
@@ -268,13 +269,14 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Plate:
-    """A force plate in the lab. axes : (3, 3) columns x ahead, y to the right, z down."""
+class Plate(SensingPlate):
+    """A force plate in the lab: x ahead, y to the right, z down.
 
-    axes: np.ndarray
-    centre_m: np.ndarray
+    origin_m : (3,) as in FORCE_PLATFORM:ORIGIN: from the transducers to the surface, z negative.
+    """
+
     size_m: tuple[float, float]
-    depth_m: float
+    origin_m: np.ndarray
 
     def corners_m(self) -> np.ndarray:
         """(4, 3) in the order of the C3D format: +x+y, -x+y, -x-y, +x-y."""
@@ -287,14 +289,6 @@ class Plate:
         local = self.axes.T @ (point_m - self.centre_m)
         beyond = np.abs(local[:2]) - 0.5 * np.array(self.size_m)
         return float(np.linalg.norm(np.maximum(beyond, 0.0)))
-
-    def origin_m(self) -> np.ndarray:
-        """(3,) as in FORCE_PLATFORM:ORIGIN: from the transducers to the surface, z negative."""
-        return np.array([0.0, 0.0, -self.depth_m])
-
-    def sensing(self) -> SensingPlate:
-        """How it reads a wrench."""
-        return SensingPlate(self.axes, self.centre_m, self.centre_m - self.axes @ self.origin_m())
 
 
 def walkway_pose(trial: Trial, laboratory: Laboratory, heading_error_rad: float) -> Pose:
@@ -314,16 +308,22 @@ def _walkway_axes(heading_rad: float) -> np.ndarray:
 def plates_of(laboratory: Laboratory) -> list[Plate]:
     """The lab's plates: one after the other in the walking direction, or one for each foot."""
     ahead, up, right = _walkway_axes(np.deg2rad(laboratory.facing_deg)).T
-    axes, depth = np.stack([ahead, right, -up], axis=1), laboratory.plate_depth_m
+    axes, origin = (
+        np.stack([ahead, right, -up], axis=1),
+        np.array([0, 0, -laboratory.plate_depth_m]),
+    )
     first = np.array([*laboratory.plate_centre_m, 0.0])
     length, width = laboratory.plate_size_m
+
+    def plate(place: np.ndarray, size_m: tuple[float, float]) -> Plate:
+        return Plate(axes, place, place - axes @ origin, size_m, origin)
+
     if laboratory.plate_per_foot:
         half = 0.5 * (width - PLATE_GAP_M)
         aside = 0.5 * (half + PLATE_GAP_M) * right
-        return [Plate(axes, first + side * aside, (length, half), depth) for side in (-1, 1)]
+        return [plate(first + side * aside, (length, half)) for side in (-1, 1)]
     pitch = (length + PLATE_GAP_M) * ahead
-    places = [first + k * pitch for k in range(laboratory.plates)]
-    return [Plate(axes, place, (length, width), depth) for place in places]
+    return [plate(first + k * pitch, (length, width)) for k in range(laboratory.plates)]
 
 
 def plate_wrenches(
@@ -357,25 +357,17 @@ def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
     return next((k for k, distance in enumerate(distances) if k and distance == 0.0), None)
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Measurement(Instruments):
     """What the lab's instruments deliver for one trial, before it is written.
 
-    points_m : (frames, markers, 3) in the lab, NaN where a marker is lost.
-    channels : (samples, 6 per plate) N and N mm in each plate's frame, not yet quantised.
-    pose : where the walkway lies in the lab (truth).
-    start_s : of the first frame on the movement's clock (truth).
-    marker_hz, analog_hz : as the file states them.
+    channels : (samples, 6 per plate) N and N mm in each plate's frame, with noise, not yet
+        quantised. pose : where the walkway lies in the lab (truth).
     """
 
-    labels: list[str]
-    points_m: np.ndarray
+    plates: tuple[Plate, ...]
     channels: np.ndarray
-    plates: list[Plate]
-    marker_hz: float
-    analog_hz: float
     pose: Pose
-    start_s: float
 
 
 def measure_trial(
@@ -398,14 +390,14 @@ def measure_trial(
     every = SIMULATION_HZ // rates.analog_hz
     wrenches = plate_wrenches(trial, plates, pose, laboratory.plate_per_foot)
     readings = [
-        plate.sensing().reading(*wrench, np.zeros(3))[::every][:samples]
+        plate.reading(*wrench, np.zeros(3))[::every][:samples]
         for wrench, plate in zip(wrenches, plates, strict=True)
     ]
     delivered = Instruments(
         labels=tuple(paths),
         points_m=np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1),
         marker_hz=rates.marker_hz,
-        plates=tuple(plate.sensing() for plate in plates),
+        plates=tuple(plates),
         readings=np.stack(readings),
         analog_hz=rates.analog_hz,
         up=np.array([0.0, 0.0, 1.0]),
@@ -415,16 +407,7 @@ def measure_trial(
     noise = np.repeat([richness.force_noise_n, richness.moment_noise_nm], 3)
     unit = np.repeat([1.0, MM], 3)
     noisy = [unit * (r + noise * rng.standard_normal(r.shape)) for r in delivered.readings]
-    return Measurement(
-        labels=list(delivered.labels),
-        points_m=delivered.points_m,
-        channels=np.hstack(noisy),
-        plates=plates,
-        marker_hz=delivered.marker_hz,
-        analog_hz=delivered.analog_hz,
-        pose=pose,
-        start_s=delivered.start_s,
-    )
+    return Measurement(**vars(delivered), channels=np.hstack(noisy), pose=pose)
 
 
 def write_trial(
@@ -435,7 +418,7 @@ def write_trial(
     quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
     """
     parameters = ("RATE", "LABELS", "DESCRIPTIONS", "UNITS")
-    c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
+    c3d, plates, labels = ezc3d.c3d(), measurement.plates, [*measurement.labels]
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
     said, units = [f"Force plate {name[-1]}" for name in names], ["N"] * 3 + ["Nmm"] * 3
     for group, *values in (
@@ -465,7 +448,7 @@ def write_trial(
     c3d.write(str(path))
 
 
-def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:
+def _add_plates(c3d: ezc3d.c3d, plates: Sequence[Plate]) -> None:
     """The FORCE_PLATFORM group; integers are set by hand because ezc3d writes floats."""
     n = len(plates)
     c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
@@ -475,7 +458,7 @@ def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:
         "ZERO": np.array([1, 0]),
         "CHANNEL": np.arange(1, 6 * n + 1).reshape(n, 6).T,
         "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
-        "ORIGIN": np.stack([MM * plate.origin_m() for plate in plates], axis=-1),
+        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
     }
     parameters = c3d["parameters"]["FORCE_PLATFORM"]
     for name, value in group.items():

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks import accuracy, accuracy_measures, accuracy_study
+from benchmarks import accuracy
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import draw_person
@@ -15,7 +15,7 @@ TRUE = Inertia(2.0, np.array([0.0, -0.1, 0.02]), np.diag([0.03, 0.012, 0.022]))
 
 def test_only_one_arm_moves():
     rng = np.random.default_rng(3)
-    plan = accuracy_study.one_arm_plan(draw_person(rng, Richness()), rng)
+    plan = accuracy.one_arm_plan(draw_person(rng, Richness()), rng)
     moved = {
         name: np.rad2deg(np.ptp(angle, axis=0).max()) for name, angle in plan.angles_rad.items()
     }
@@ -27,19 +27,19 @@ def test_only_one_arm_moves():
 def test_errors_of_a_segment():
     turn = np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]])
     found = Inertia(2.5, TRUE.com_m + SHIFT_M, 1.1 * turn @ TRUE.tensor_kgm2 @ turn.T)
-    wrong = accuracy_measures.errors(found.readable(), TRUE.readable())
+    wrong = accuracy.errors(found.readable(), TRUE.readable())
     assert wrong["mass"] == pytest.approx(0.5)
     assert wrong["centre"] == pytest.approx(5.0)
     assert wrong["inertias"] == pytest.approx(10.0)  # principal: however the axes turn
     assert wrong["physical"] == 1.0
     impossible = Inertia(2.5, TRUE.com_m, np.diag([0.03, 0.01, 0.05]))
-    assert accuracy_measures.errors(impossible.readable(), TRUE.readable())["physical"] == 0.0
+    assert accuracy.errors(impossible.readable(), TRUE.readable())["physical"] == 0.0
 
 
 def test_intervals_are_counted_per_group():
     true = TRUE.readable()
     found = true + np.array([0.0, 1.9, 2.0, 0.0, *[3.0] * 3, *[1.0] * 3])
-    held = accuracy_measures.inside(found, np.ones(10), true)
+    held = accuracy.inside(found, np.ones(10), true)
     assert held["masses"] == 1.0
     assert held["centres of mass"] == pytest.approx(2 / 3)
     assert held["tensors"] == 0.5
@@ -48,7 +48,7 @@ def test_intervals_are_counted_per_group():
 
 def test_ratios_are_taken_per_task():
     """A task with large errors does not outweigh the others."""
-    size = {"RM": 2.0, "RM+mass": 1.5, "consistent": 1.0, accuracy_measures.TRUTH: 0.5}
+    size = {"RM": 2.0, "RM+mass": 1.5, "consistent": 1.0, accuracy.TRUTH: 0.5}
     size |= dict.fromkeys(accuracy.ESTIMATORS[1:], 1.0)
     forces = pd.DataFrame(
         [
@@ -69,20 +69,18 @@ def test_ratios_are_taken_per_task():
 @pytest.mark.long
 def test_one_person(tmp_path):
     study, out = tmp_path / "study", tmp_path / "out"
-    accuracy_study.write_study(study, 1, seed=5)
-    own = accuracy.identify(study, out, accuracy_study.ONE_ARM)
-    found = accuracy.named(accuracy_measures.segment_errors(study, out))
+    accuracy.write_study(study, 1, seed=5)
+    own = accuracy.identify(study, out, accuracy.ONE_ARM)
+    found = accuracy.named(accuracy.segment_errors(study, out))
     assert len(found) == 15 * (2 + len(accuracy.ESTIMATORS))
     assert found.loc[found["method"] == "consistent", "physical"].all()
     assert accuracy.LITTLE in accuracy.notes(out)
-    forces = accuracy.named(
-        accuracy_measures.force_errors(study, out, [own], ["squat", "throwing"])
-    )
+    forces = accuracy.named(accuracy.force_errors(study, out, [own], ["squat", "throwing"]))
     for table in (accuracy.segment_table, accuracy.coverage_table):
         assert "nan" not in table(found)
     for table in (accuracy.force_table, accuracy.floor_table):
         assert "nan" not in table(forces)
     squat = forces[(forces["task"] == "squat") & (forces["component"] == "fz")]
     rmse = squat.set_index("method")["rmse"]
-    assert rmse[accuracy_measures.TRUTH] < rmse["RM"]
+    assert rmse[accuracy.TRUTH] < rmse["RM"]
     assert not list(out.glob("sub-*/*_fit.parquet"))  # the truth is no method of the study

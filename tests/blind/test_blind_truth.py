@@ -37,7 +37,7 @@ def hidden(name: str, size: float, target: str = "") -> HiddenEffect:
 
 def instruments_of(wrench: np.ndarray) -> Instruments:
     """The simulated lab's plate, in the middle of nowhere, shows a wrench about the origin."""
-    sensing = plates_of(Laboratory())[0].sensing()
+    sensing = plates_of(Laboratory())[0]
     readings = sensing.reading(wrench[:, :3], wrench[:, 3:], np.zeros(3))[None]
     points = np.zeros((len(wrench), 1, 3))
     up = np.array([0.0, 0.0, 1.0])

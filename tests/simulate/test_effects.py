@@ -87,7 +87,7 @@ def readings(measurement: Measurement) -> np.ndarray:
 def cop_of(measurement: Measurement) -> np.ndarray:
     """(N, 2) lab, where the file says that the plate lies."""
     plate = measurement.plates[0]
-    force, moment = plate.sensing().lab_wrench(readings(measurement), plate.centre_m)
+    force, moment = plate.lab_wrench(readings(measurement), plate.centre_m)
     return plate.centre_m[:2] + np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:]
 
 

@@ -17,6 +17,7 @@ from bsip_cli.simulate.effects import drawn
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness
 from bsip_cli.simulate.recording import measure_trial, write_trial
+from tests.recordings.recording_writers import write_mot, write_trc
 from tests.simulate.conftest import person_of, trial_of_task
 
 G = 9.81
@@ -42,32 +43,18 @@ def trc(tmp_path_factory, recorded) -> Path:
     folder = tmp_path_factory.mktemp("trc")
     here = read_recording(recorded)
     points = here.markers_m[..., [1, 2, 0]]
-    head = ["PathFileType\t4\t(X/Y/Z)\tx.trc"]
-    head += ["DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"]
-    head += [f"100\t100\t{len(points)}\t{len(here.labels)}\tmm"]
-    head += ["Frame#\tTime\t" + "\t\t\t".join(here.labels) + "\t\t", "\t\tX1\tY1\tZ1", ""]
-    rows = [
-        "\t".join([str(k + 1), f"{k / 100:.2f}", *(cell(1000 * v) for v in frame.ravel())])
-        for k, frame in enumerate(points)
-    ]
-    file = folder / "sub-01_task-squat_run-1.trc"
-    file.write_text("\n".join([*head, *rows]) + "\n")
-    names = ["time"] + [f"ground_force_{k}" for k in ("vx", "vy", "vz", "px", "py", "pz")]
-    names += [f"ground_torque_{a}" for a in "xyz"]
+    file, times = folder / "sub-01_task-squat_run-1.trc", np.arange(len(points)) / 100
+    write_trc(file, times, points, here.labels)
     force, moment = here.plates[0].force_N, here.plates[0].moment_Nm
     point = np.stack([-moment[:, 1], moment[:, 0]], axis=1) / force[:, 2:]
     twist = moment[:, 2] - point[:, 0] * force[:, 1] + point[:, 1] * force[:, 0]
     zero = np.zeros(len(force))
-    columns = [force[:, 1], force[:, 2], force[:, 0], point[:, 1], zero, point[:, 0]]
-    table = np.stack([np.arange(len(force)) / 500, *columns, zero, twist, zero], axis=1)
-    lines = ["forces", "version=1", f"nRows={len(table)}", "nColumns=10", "endheader"]
-    lines += ["\t".join(names), *("\t".join(f"{v:.9g}" for v in row) for row in table)]
-    file.with_suffix(".mot").write_text("\n".join(lines) + "\n")
+    names = [f"ground_force_{k}" for k in ("vx", "vy", "vz", "px", "py", "pz")]
+    names += [f"ground_torque_{a}" for a in "xyz"]
+    values = (force[:, 1], force[:, 2], force[:, 0], point[:, 1], zero, point[:, 0])
+    columns = dict(zip(names, (*values, zero, twist, zero), strict=True))
+    write_mot(file.with_suffix(".mot"), np.arange(len(force)) / 500, columns)
     return file
-
-
-def cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.6f}"
 
 
 def injected(source: Path, folder: Path, *effects: Effect) -> tuple[Recording, Recording]:

@@ -22,8 +22,6 @@ BALL_AXES = "zxy"
 class IdentifiedPerson:
     """One person's geometry with the inertial parameters of one method.
 
-    Attributes
-    ----------
     inertias : per segment with mass, in its segment frame.
     made_of : lines that say what the numbers come from; they stand in every file.
     """
@@ -52,10 +50,7 @@ class IdentifiedPerson:
     def check_bodies(self) -> None:
         """Simulators take real bodies only.
 
-        Raises
-        ------
-        BadDataError
-            A segment has an inertia that no body can have.
+        BadDataError: a segment has an inertia that no body can have.
         """
         bodies = zip(self.person.skeleton.body_names, self.inertias, strict=True)
         impossible = [name for name, inertia in bodies if not inertia.is_physical()]
@@ -86,10 +81,7 @@ class IdentifiedPerson:
     def markers(self) -> Iterator[tuple[str, int, np.ndarray]]:
         """Plain name, segment and place (3,) in the segment's joint [m] of each.
 
-        Raises
-        ------
-        BadDataError
-            Two markers would have one name.
+        BadDataError: two markers would have one name.
         """
         person = self.person
         names, places = plain_names(person.markers), person.markers_in_joint_m()
@@ -137,10 +129,7 @@ def xml_comment(lines: Iterable[str]) -> str:
 def plain_names(names: Iterable[str]) -> tuple[str, ...]:
     """Marker names in letters, digits, ``_``, ``.`` and ``-``, as every format takes them.
 
-    Raises
-    ------
-    BadDataError
-        Two markers would get the same name.
+    BadDataError: two markers would get the same name.
     """
     plain = tuple(re.sub(r"[^A-Za-z0-9_.-]", "_", name) for name in names)
     twice = sorted({name for name in plain if plain.count(name) > 1})

@@ -64,10 +64,7 @@ class Replacement:
 def read_given_model(content: bytes, file: str) -> GivenModel:
     """Parse an .osim file.
 
-    Raises
-    ------
-    UsageError
-        It is not a model of OpenSim 4.
+    UsageError: it is not a model of OpenSim 4.
     """
     builder = ET.TreeBuilder(insert_comments=True)
     try:
@@ -93,10 +90,7 @@ def read_given_model(content: bytes, file: str) -> GivenModel:
 def check_fits(model: GivenModel, body_map: BodyMap) -> None:
     """The model has every body and joint that the map names.
 
-    Raises
-    ------
-    UsageError
-        It lacks some, or bodies of a group are not joined to each other or have no mass.
+    UsageError: it lacks some, or bodies of a group are not joined to each other or have no mass.
     """
     lost = sorted(body_map.bodies() - set(model.masses_kg))
     anchors = {body for group in body_map.groups for _, body in group.joints}
@@ -268,8 +262,6 @@ def _read(inertia: pin.Inertia) -> Inertia:
 class BodyGroup:
     """Bodies of a model that together are some of our segments.
 
-    Attributes
-    ----------
     bodies : they share the mass in the proportions they have in the model; the first one's frame
         is that of the group.
     segments : united in the neutral pose, in the first one's axes.
@@ -294,10 +286,7 @@ class BodyMap:
 def load_body_map(name: str) -> BodyMap:
     """Read a map: the name of a shipped one, or a path that ends in ``.toml``.
 
-    Raises
-    ------
-    UsageError
-        There is no such file, or it is no map.
+    UsageError: there is no such file, or it is no map.
     """
     file = named_file("opensim", name, "map of bodies")
     data = read_toml(file)
@@ -332,10 +321,7 @@ def fitting_map(bodies: Iterable[str]) -> BodyMap | None:
 def check_segments(body_map: BodyMap, skeleton: Skeleton) -> None:
     """Every segment of the skeleton that has mass goes into exactly one group.
 
-    Raises
-    ------
-    UsageError
-        A segment is missing, stands twice, or is not one with mass of the skeleton.
+    UsageError: a segment is missing, stands twice, or is not one with mass of the skeleton.
     """
     named = [segment for group in body_map.groups for segment in group.segments]
     jointed = {segment for group in body_map.groups for segment, _ in group.joints}

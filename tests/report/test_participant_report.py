@@ -139,7 +139,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "How large are the errors? ● OM, ○ RM" in first
+    assert "How large are the errors? ● OM (basketball: RM), ○ RM" in first
     assert "What makes the squared error before identification:" in first
     assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first
@@ -188,7 +188,7 @@ def test_a_page_without_room_has_fewer_findings(record, monkeypatch):
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
-    fit = record.trials[2].fit.query("method == 'OM'").set_index("component")
+    fit = record.trials[2].fit.query("method == 'RM'").set_index("component")  # as chosen there
     percent = fit.loc["grf_vertical", "rmse_percent_bw"]
     assert f"Vertical force error: {number(percent)} % of body weight" in first
     cop = (fit.loc["cop_ap", "rmse"] ** 2 + fit.loc["cop_ml", "rmse"] ** 2) ** 0.5
@@ -239,7 +239,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     assert (light.state, light.title) == ("large", "Large error even with identified parameters")
     (finding,) = large_finding(large)
     assert finding.startswith(
-        "Large error with OM: vertical force 5.5 %, most in sequence; cause unknown: none of the"
+        "Large error with OM (basketball: RM): vertical force 5.5 %, most in sequence; cause unknown: none of the"
     )
     (numbered,) = (block for block in front(large) if isinstance(block, Numbered))
     assert numbered.items == (finding,)

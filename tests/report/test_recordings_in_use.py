@@ -167,7 +167,7 @@ def test_a_large_error_comes_first_and_counts(record):
     far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
     (finding,) = large_finding(far)
     assert finding == (
-        "Large error with OM: vertical force 9.0 %, most in basketball; other "
+        "Large error with OM (basketball: RM): vertical force 9.0 %, most in basketball; other "
         "findings explain part at most."
     )
     (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
@@ -257,7 +257,9 @@ def test_markers_far_off_are_no_matter_of_the_forces(record):
     facts = record.facts.copy()
     facts["marker_rms_m"] = 0.025
     lost = replace(with_faults(record, TURNED), facts=facts)
-    assert large_finding(lost)[0].startswith("Large error with OM: markers from model 25")
+    assert large_finding(lost)[0].startswith(
+        "Large error with OM (basketball: RM): markers from model 25"
+    )
     assert "explain" not in large_finding(lost)[0] and number_of_main_part(lost) == 0
     *_, to_do = front(lost)
     assert to_do.items[0].startswith("Finding 1: Check that marker set and labels are right")
@@ -275,12 +277,14 @@ def test_the_terminal_numbers_findings_as_the_page_does(reports, tmp_path):
         artifacts.write("fit", far, trial)
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert " 1. Large error with OM: vertical force 9.0 %" in said
+    assert " 1. Large error with OM (basketball: RM): vertical force 9.0 %" in said
     assert " 2. Force plate turned or tilted: plate 1 is turned by +2.0 degrees" in said
     full = " ".join("\n".join(shown(tmp_path, full=True)).split())
     assert " 2. Plate 1 is turned" in full and "Findings 2 and 3: The measured forces" in full
     page = replace(reports, out=tmp_path).html("sub-01")
-    assert page.count("Large error with OM: vertical force") == 2  # and in the fold
+    assert (
+        page.count("Large error with OM (basketball: RM): vertical force") == 2
+    )  # and in the fold
 
 
 def test_numbers_of_advice_begin_where_the_findings_do():
@@ -384,8 +388,10 @@ def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
 
 def test_errors_by_other_parameters_stand_beside(record):
     assert {one.name: size for one, size in measured_of(record, "RM")}[COP] > 0
-    scales = next(block for block in front(record) if hasattr(block, "scales")).scales
-    assert [bool(scale.other) for scale in scales] == [True, True, False]
+    everywhere = replace(record, choice=record.choice.query("movement == 'all'"))  # OM
+    for used, differs in ((everywhere, True), (record, False)):  # in basketball RM, held out alone
+        scales = next(block for block in front(used) if hasattr(block, "scales")).scales
+        assert [bool(scale.other) for scale in scales] == [differs, differs, False]
     table = replace(record, choice=record.choice.assign(use="RM"))
     scales = next(block for block in front(table) if hasattr(block, "scales")).scales
     assert not any(scale.other for scale in scales)

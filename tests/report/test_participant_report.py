@@ -239,7 +239,8 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     assert (light.state, light.title) == ("large", "Large error even with identified parameters")
     (finding,) = large_finding(large)
     assert finding.startswith(
-        "Large error with OM (basketball: RM): vertical force 5.5 %, most in sequence; cause unknown: none of the"
+        "Large error with OM (basketball: RM): vertical force 5.5 %, most in sequence; cause "
+        "unknown: none of the"
     )
     (numbered,) = (block for block in front(large) if isinstance(block, Numbered))
     assert numbered.items == (finding,)

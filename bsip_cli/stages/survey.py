@@ -233,4 +233,7 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
     written = {name: facts[name].get(trial.stem, 1.0) for name in asdict(AS_WRITTEN)}
     of_trials = {name: facts[name] for name in _OF_TRIALS}
+    mine = trial.stem.partition("_task-")[0]  # person and session
+    delays_s = {k: s for k, s in of_trials["delays_s"].items() if k.partition("_task-")[0] == mine}
+    of_trials["delays_s"] = delays_s
     return SessionReading(frame, plates, **of_trials, written=Written(**written))

@@ -39,6 +39,13 @@ def session_of(trial: Opened, *others: Opened):
     return session_reading([TrialSamples.of(one) for one in (trial, *others)])
 
 
+def test_where_another_trial_is_late_a_quiet_one_says_that_it_shows_nothing():
+    quiet = opened(of_c3d())
+    session = replace(session_of(quiet), delays_s={"b": -0.95})
+    (said,) = (f for f in assemble(quiet, session).findings if f.check == "delay")
+    assert said.level == "warning" and "in b the forces come 0.95 s earlier" in said.found
+
+
 @pytest.mark.parametrize("make", [of_c3d, of_table])
 @pytest.mark.parametrize("delay_s", [-0.65, -0.5, 0.55, 0.8, 1.3])
 def test_a_delay_is_found_and_taken_off(make, delay_s):

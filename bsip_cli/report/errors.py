@@ -145,7 +145,10 @@ def use_sentence(
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
     said = f"{use} {', and '.join([*others, most])}{compared}."
-    warned = [f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare]
+    warned = [
+        f"Never use {m}, however small its error: fewer than 1 in 100 people have such a body, so it takes up another error."
+        for m in rare
+    ]
     return " ".join([said, *warned])
 
 
@@ -301,7 +304,7 @@ REST = "all others"
 UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
-_UNSURE = "too unsure for a finding"
+_UNSURE = "no finding of its own"
 _LAST = ("noise", UNKNOWN)
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing

@@ -148,7 +148,7 @@ def light_of(
         title = "; ".join(filter(None, (error, f"{more}{found}")))
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
-    no_large = f"no large error{f' but in {listing(alone)}' if alone else ''}"
+    no_large = f"no large error{f' except in {listing(alone)}' if alone else ''}"
     if not causes:
         title = "No fault found" if large is None else f"Fine: no fault found, {no_large}"
         return Light("fine", title, nothing)

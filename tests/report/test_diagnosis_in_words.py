@@ -467,7 +467,7 @@ def test_what_was_found_has_its_own_piece_and_makes_as_much_as_it_says(share):
     assert found_share(fault, found) == pytest.approx(share)
     others = {one.label for one in overall_pieces(fault, ())}
     assert {label for label in others if title in label} == (
-        {f"{title} (too unsure for a finding)"} if share > 5 else set()
+        {f"{title} (no finding of its own)"} if share > 5 else set()
     )
     assert found_share(fault, {"sync_offset"}) == found_share(table, found) == 0.0
 

@@ -144,15 +144,16 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
-    assert "Use once corrected or stated: sequence (finding 1); basketball (findings 1 and" in first
+    corrected = "sequence (finding 1); basketball (findings 1 and"
+    assert f"Use after correcting, or stating the load: {corrected}" in first
     assert (
         "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
         "another (study.toml: roles); run again. Then use RM for basketball, where OM is not "
         "clearly better, and OM for all other movements: in both other recordings OM's error is "
         "34 to 46 % smaller than RM's," in first
     )
-    assert f"Files {FILE} Parameters RM (regression method): a table;" in first
-    assert "OM (optimisation method): identified from sequence" in first
+    assert f"Files {FILE} Parameters RM (regression method): segment masses" in first
+    assert "OM (optimisation method): fitted to this person in sequence" in first
     assert f"sequence and basketball; date unknown Files {FILE}" in first
     assert f"Report {date.today().isoformat()}, bsip 0" in first
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first

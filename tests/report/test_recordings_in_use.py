@@ -126,7 +126,7 @@ def test_what_quiet_stance_shows_concerns_all(record):
     weight = fault("plate_gain", STATIC, class_id="W", verdict="ambiguous")
     assert kinds_of(with_faults(record, weight)) == ["corrected"] * 3
     said = list(use_lines(with_faults(record, weight)))
-    assert said == ["Use once corrected or stated: all recordings (finding 1)."]
+    assert said == ["Use after correcting, or stating the load: all recordings (finding 1)."]
 
 
 def test_without_a_diagnosis_nothing_is_said_of_the_recordings(record):
@@ -144,7 +144,7 @@ def test_runs_are_counted_where_they_are_many(record):
     )
     assert list(use_lines(many)) == [
         "Use (motion, forces, joint moments): sequence, basketball and 5 × walking.",
-        "Use once corrected or stated: static (finding 1).",
+        "Use after correcting, or stating the load: static (finding 1).",
     ]
     two = replace(many, trials=many.trials[:5])
     assert "basketball, walking run 1 and walking run 2." in next(iter(use_lines(two)))
@@ -155,12 +155,12 @@ def test_runs_are_counted_where_they_are_many(record):
 
 def test_large_alone_is_in_the_title(record):
     far = with_error(with_faults(record), SEQUENCE, rmse_percent_bw=9.0)
-    assert light_for(far).title == "Fine: no fault found, no large error but in sequence"
+    assert light_for(far).title == "Fine: no fault found, no large error except in sequence"
     assert large_finding(far) == ()
     *_, to_do = front(replace(far, refusals=()))
     assert len(to_do.items) == 1 and to_do.items[0].startswith("In sequence look for feet or hands")
     both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
-    assert light_for(both).title == "1 fault found; no large error but in sequence"
+    assert light_for(both).title == "1 fault found; no large error except in sequence"
 
 
 def test_a_large_error_comes_first_and_counts(record):
@@ -233,7 +233,7 @@ def test_what_makes_the_largest_part_in_a_recording_says_what_helps(record):
     assert "error of unknown cause" not in first_to_do("unknown")
     assert first_to_do("unknown").startswith("Finding 1: In basketball look for feet or hands")
     assert first_to_do("fault:plate_rotation").startswith("Finding 2: Correct the forces")
-    assert "forces and markers out of step (too unsure for a finding) may make" in first_to_do(
+    assert "forces and markers out of step (no finding of its own) may make" in first_to_do(
         "fault:sync_offset"
     )
 

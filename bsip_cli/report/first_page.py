@@ -184,7 +184,7 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
     groups.sort()
     for numbers, titles in groups[:named]:
         (name, _), *others = Counter(titles).most_common()
-        more = f", or {count(len(others), 'other')}" if others else ""
+        more = f", or {count(len(others), 'other cause')}" if others else ""
         yield f"{in_a_row(numbers)}: {name}{more}"
     if rest := sum(len(numbers) for numbers, _ in groups[named:]):
         yield f"{rest} more"

@@ -65,7 +65,8 @@ class TrialRecord:
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``made_on`` the day
-    of the report, ``recorded_on`` those of the recordings as the study states them, ``loads`` the known loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
+    of the report, ``recorded_on`` those of the recordings as the study states them, ``loads`` the
+    known loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
     ``changes`` (of a model extended by what was found), and ``choice`` are None where their stages
     have not run. ``defaults`` : every option's shipped value."""
 

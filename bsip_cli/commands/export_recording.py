@@ -139,7 +139,9 @@ class _Correction:
         self.unit, self.left = unit, list[str]()
         trial, table = unit.own_trial, unit.read("readings")
         self._session = reading_of(table, unit.facts("readings"), trial)
-        self._opened = opened(unit, trial, self._session.written).in_frame(self._session.frame)
+        self._gains = self._session.gains()  # as ingest does, taken off
+        as_read = opened(unit, trial, self._session.written, self._gains)
+        self._opened = as_read.in_frame(self._session.frame)
         events = unit.read("marker-events")
         exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
         pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
@@ -214,6 +216,11 @@ class _Correction:
                 f"plate {name}: {replace(reading, turn=0, mirrored=False, place_of='').words()}"
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
+            ),
+            *(
+                f"plate {name}: forces and moments divided by {gain:.4g}"
+                for name, gain in self._gains.items()
+                if name in self._plates
             ),
             *(
                 f"plate {name}: its reading without load, "
@@ -324,7 +331,8 @@ class _Correction:
         readings, times = before.readings.copy(), self._scene.times_s
         stamps = self._stamps(before)
         for name, reading in self._plates.items():
-            now, k = self._wrench(name, _stated(reading)), int(name) - 1
+            now = self._gains.get(name, 1.0) * self._wrench(name, _stated(reading))
+            k = int(name) - 1
             wanted = corrected.get(name, self._understood(name))
             zero = self._zeros.get(name, np.zeros(6))
             wanted = wanted if is_noticed(zero) else wanted + zero

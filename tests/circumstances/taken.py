@@ -66,6 +66,14 @@ def concluded(study: Path, out: Path) -> str:
     return found if re.search(r"\b1\. |Large error", found) else ""
 
 
+def exported(study: Path, out: Path, to: Path) -> None:
+    """The study as `bsip export --what recording` corrects it."""
+    code, *_ = _called(
+        "export", str(study), "--out", str(out), "--what", "recording", "--to", str(to)
+    )
+    assert code == 0
+
+
 def _called(*arguments: str) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a command, in this process."""
     shown, printed = StringIO(), StringIO()

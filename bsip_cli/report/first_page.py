@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 _SEXES = {"M": "man", "F": "woman"}
 _MOST_WORDS = 393  # with the title 400
 _FINDINGS = ((2, 4), (2, 2), (1, 2))  # in full, and kinds that are named only
+_BRIEF_WORDS = 12  # of a finding that is named only; else its title
 _FEW = 3  # findings, whose actions are all given
 _MOST_TO_DO = 3
 _MOST_FILES = 2  # that are named
@@ -171,7 +172,7 @@ def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks
 
 
 def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> Iterator[str]:
-    """``3 and 5: marker not in its place``; findings of which one may be the other count together,
+    """``3 and 5: marker not in its place``, one alone as it is; findings of which one may be the other count together,
     by the name that most of them may have."""
     groups: list[tuple[list[int], list[str]]] = []
     for k, cause in enumerate(causes, first):
@@ -183,6 +184,11 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:named]:
+        own = causes[numbers[0] - first]
+        what = own[0].words.short or own[0].words.what
+        if len(numbers) == len(own) == 1 and len(what.split()) <= _BRIEF_WORDS:
+            yield f"{numbers[0]}: {what}"
+            continue
         (name, _), *others = Counter(titles).most_common()
         more = f", or {count(len(others), 'other cause')}" if others else ""
         yield f"{in_a_row(numbers)}: {name}{more}"
@@ -224,7 +230,8 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
         one.scale(size, other if other.shown != one.scale(size).shown else None)
         for (one, size), other in zip(measured_of(record), with_table, strict=True)
     ]
-    which = f"? ● {record.use_words()}, ○ {RM}" if record.use_words() != RM else f" with {RM}?"
+    used, later = record.use_words(), ", once it may be used" if must_wait(record) else ""
+    which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(errors.SOURCES, "note")

@@ -139,7 +139,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "How large are the errors? ● OM (basketball: RM), ○ RM" in first
+    assert "the errors? ● OM (basketball: RM), once it may be used, ○ RM" in first
     assert "What makes the squared error before identification:" in first
     assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first

@@ -146,7 +146,7 @@ def use_sentence(
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
     said = f"{use} {', and '.join([*others, most])}{compared}."
     warned = [
-        f"Never use {m}, however small its error: fewer than 1 in 100 people have such a body, so it takes up another error."
+        f"Never use {m}: fewer than 1 in 100 people have such a body; other errors made it."
         for m in rare
     ]
     return " ".join([said, *warned])

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST_WORDS = 393  # with the title 400
-_FINDINGS = ((2, 4), (2, 2), (1, 2))  # in full, and kinds that are named only
+_FINDINGS = ((2, 4), (2, 2), (2, 1), (1, 2))  # in full, and kinds that are named only
 _BRIEF_WORDS = 12  # of a finding that is named only; else its title
 _FEW = 3  # findings, whose actions are all given
 _MOST_TO_DO = 3
@@ -230,7 +230,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
         one.scale(size, other if other.shown != one.scale(size).shown else None)
         for (one, size), other in zip(measured_of(record), with_table, strict=True)
     ]
-    used, later = record.use_words(), ", once it may be used" if must_wait(record) else ""
+    used, later = record.use_words(), ", once usable" if must_wait(record) else ""
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))

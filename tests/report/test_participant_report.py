@@ -139,7 +139,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "the errors? ● OM (basketball: RM), once it may be used, ○ RM" in first
+    assert "the errors? ● OM (basketball: RM), once usable, ○ RM" in first
     assert "What makes the squared error before identification:" in first
     assert "the table's segment parameters (OM corrects these) 70 %" in first
     assert "unknown 20 %" in first
@@ -152,8 +152,8 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "clearly better, and OM for all other movements: in both other recordings OM's error is "
         "34 to 46 % smaller than RM's," in first
     )
-    assert f"Files {FILE} Parameters RM (regression method): segment masses" in first
-    assert "OM (optimisation method): fitted to this person in sequence" in first
+    assert f"Files {FILE} Parameters RM (regression method): a table;" in first
+    assert "OM (optimisation method): fitted to sequence" in first
     assert f"sequence and basketball; date unknown Files {FILE}" in first
     assert f"Report {date.today().isoformat()}, bsip 0" in first
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first

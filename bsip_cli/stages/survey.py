@@ -83,10 +83,11 @@ def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
 
 
 def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict[str, float]:
-    """Of plates that surely read another force than the load."""
+    """Of plates that surely read another force than the load; with known loads in some trials no
+    masses agree, and none is sure."""
     if sum(not (one.refusal or one.repeats) for one in reading.plates.values()) < 2:
         return {}
-    shown: dict[str, dict[str, list[Interval]]] = {}
+    shown: dict[str, dict[str, Sequence[Interval]]] = {}
     masses = [unit.person.mass_kg]
     for trial in trials:
         try:
@@ -94,10 +95,8 @@ def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict
         except BadDataError:  # its own turn will say why
             continue
         masses.append(recording.stated.mass_kg)
-        load_kg = unit.load_kg(trial)
         for plate, intervals in masses_alone(recording).items():
-            own = [one.without(load_kg) for one in intervals]
-            shown.setdefault(plate, {})[trial.stem] = own
+            shown.setdefault(plate, {})[trial.stem] = intervals
     options = unit.config.ingest
     return plate_gains(
         shown,

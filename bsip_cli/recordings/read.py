@@ -288,8 +288,8 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
     if verdict.gain != 1.0:
-        found = f"while it bears the person alone, it reads {verdict.gain:.3g} times the weight "
-        found += "that the other plates and the stated mass agree on"
+        found = f"while it bears the person alone, it reads {verdict.gain:.4g} times the weight "
+        found += "on which at least two others, plates or the stated mass, agree"
         action = (
             f"divided its forces and moments by {verdict.gain:.4g}, in all trials; correct its "
         )

@@ -263,11 +263,8 @@ def _draw_inertias(
     trunk = mean["thorax"].length_m + mean["abdomen"].length_m
     inertias = {}
     for body in BODIES:
-        kind, row, own_mass = (
-            without_side(body),
-            mean[without_side(body)],
-            mass * masses[body] / total,
-        )
+        kind, own_mass = without_side(body), mass * masses[body] / total
+        row = mean[kind]
         # the pelvis' own length follows the trunk's
         pelvis = row.length_m * lengths["upper_torso"] / trunk
         length = pelvis if body == "lower_torso" else lengths[body]

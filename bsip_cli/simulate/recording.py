@@ -308,10 +308,8 @@ def _walkway_axes(heading_rad: float) -> np.ndarray:
 def plates_of(laboratory: Laboratory) -> list[Plate]:
     """The lab's plates: one after the other in the walking direction, or one for each foot."""
     ahead, up, right = _walkway_axes(np.deg2rad(laboratory.facing_deg)).T
-    axes, origin = (
-        np.stack([ahead, right, -up], axis=1),
-        np.array([0, 0, -laboratory.plate_depth_m]),
-    )
+    axes = np.stack([ahead, right, -up], axis=1)
+    origin = np.array([0, 0, -laboratory.plate_depth_m])
     first = np.array([*laboratory.plate_centre_m, 0.0])
     length, width = laboratory.plate_size_m
 

@@ -33,7 +33,7 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.read import delay_words
 from bsip_cli.recordings.session_reading import Verdict
-from bsip_cli.recordings.zero import is_noticed
+from bsip_cli.recordings.zero import is_noticed, is_silent
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
@@ -314,9 +314,10 @@ class _Correction:
         unit, recording = self.unit, self._opened.recording
         table = unit.read("wrench")
         plates = tuple(
-            replace(plate, wrench=self._understood(plate.name))
+            replace(plate, wrench=reading, silent=is_silent(reading))
             for plate in plates_of(unit.read("plates"), table)
             if plate.name in self._plates
+            for reading in [self._understood(plate.name)]
         )
         samples = np.arange(len(self._opened.sources[0].usable))
         times = recording.time0_s + samples / recording.analog_rate_hz

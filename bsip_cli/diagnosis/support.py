@@ -96,10 +96,12 @@ def support_of(scene: Scene) -> Support | None:
     measured part is too short to decide."""
     if scene.valid.sum() < SHORTEST_S * scene.rate_hz:
         return None
-    paths = {name: _path_m(scene, name) for name in HANDS if name in scene.bodies}
+    some = [*(name for name in HANDS if name in scene.bodies), TRUNK]
+    paths = {name: scene.centre(name).position_m[scene.valid] for name in some}
+    trunk = paths.pop(TRUNK)
     missing = (scene.predicted - scene.measured)[scene.valid, :3]
     weight = scene.mass_kg * GRAVITY_M_S2
-    return held_by(paths, _path_m(scene, TRUNK), missing, scene.times_s[scene.valid], weight)
+    return held_by(paths, trunk, missing, scene.times_s[scene.valid], weight)
 
 
 def held_by(
@@ -129,11 +131,6 @@ def held_by(
         tuple(error.tolist()),
         _gain(missing_N, times_s).interval(),
     )
-
-
-def _path_m(scene: Scene, segment: str) -> np.ndarray:
-    """(n, 3) of a segment's centre of mass in the valid frames, world."""
-    return scene.point(segment, scene.centre_of(segment)).position_m[scene.valid]
 
 
 def _moves_m(path_m: np.ndarray) -> float:

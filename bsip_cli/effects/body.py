@@ -212,7 +212,7 @@ def _swings(
     x'' = -2 damping pace x' - pace^2 x - ground, at rest when the trial begins; exact where the
     ground's acceleration is linear between samples.
     """
-    point = scene.point(target, scene.centre_of(target))
+    point = scene.centre(target)
     ground, pace = point.acceleration_m_s2, 2 * np.pi * frequency_hz
 
     def response(numerator: list[float]) -> np.ndarray:
@@ -280,7 +280,7 @@ class Breathing(Effect):
             + 2 * speed[:, None] * np.cross(w, out)
             + moved * (np.cross(dw, out) + np.cross(w, np.cross(w, out)))
         )
-        centre = scene.point(target, scene.centre_of(target))
+        centre = scene.centre(target)
         carried = centre.acceleration_m_s2 - scene.model.gravity.linear
         moment = np.cross(centre.position_m, force) + np.cross(moved * out, carried)
         return np.hstack([force, moment])

@@ -88,8 +88,7 @@ class AddedMass(Effect):
 
 def carried(scene: Scene, target: str) -> np.ndarray:
     """(N, 6) ground wrench of 1 kg at the segment's centre of mass."""
-    point = scene.centre_of(target)
-    return scene.once(("carried", target), lambda: scene.point(target, point).carrying_wrench())
+    return scene.once(("carried", target), lambda: scene.centre(target).carrying_wrench())
 
 
 # --- held for a while -----------------------------------------------------------------------------
@@ -238,7 +237,7 @@ class Implement(Effect):
         one = hands(scene)
         if len(one) != 2 or not scene.valid.any():
             return one
-        left, right = (_path_m(scene, name) for name in one)
+        left, right = (scene.centre(name).position_m for name in one)
         apart = np.linalg.norm(left - right, axis=1)[scene.valid]
         together = apart.max() < sum(scene.length_of(name) for name in one)
         return (*one, "+".join(one)) if together else one
@@ -321,7 +320,7 @@ def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[int, np.ndarray, 
     against the other, in the mean over what is measured.
     """
     numbers = [scene.person.skeleton.index(name) for name in held_by]
-    middle = np.mean([_path_m(scene, name) for name in held_by], axis=0)
+    middle = np.mean([scene.centre(name).position_m for name in held_by], axis=0)
     first = scene.motion.rotation[:, numbers[0]]
     grips = []
     for i in numbers:
@@ -333,11 +332,6 @@ def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[int, np.ndarray, 
     return grips
 
 
-def _path_m(scene: Scene, segment: str) -> np.ndarray:
-    """(N, 3) of a segment's centre of mass, world."""
-    return scene.point(segment, scene.centre_of(segment)).position_m
-
-
 # --- forces that no plate measures ----------------------------------------------------------------
 
 
@@ -345,7 +339,7 @@ def missing_wrenches(scene: Scene, target: str) -> np.ndarray:
     """(N, 6, 3) what the plates lack for a unit force on a segment's centre of mass."""
 
     def missing() -> np.ndarray:
-        point = _path_m(scene, target)
+        point = scene.centre(target).position_m
         forces = np.broadcast_to(np.eye(3), (len(point), 3, 3))
         return -np.concatenate([forces, skew(point)], axis=1)
 

@@ -101,7 +101,8 @@ class OfPlates(Effect):
 
 
 class OwnSignal(OfPlates):
-    """A channel of one plate shows a signal too much, whatever it measures."""
+    """A channel of one plate shows a signal too much, whatever it measures, but where software has
+    written zeros since."""
 
     channels = CHANNELS
 
@@ -114,8 +115,10 @@ class OwnSignal(OfPlates):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, channel = target.rsplit(" ", 1)
-        signal = values[0] * self.signal(scene)
-        return in_channel(plate_of(scene, name), CHANNELS.index(channel), signal)
+        plate, signal = plate_of(scene, name), values[0] * self.signal(scene)
+        if plate.silent is not None:
+            signal = np.where(plate.silent, 0.0, signal)
+        return in_channel(plate, CHANNELS.index(channel), signal)
 
     def _reads(self, target: str) -> tuple[str, str]:
         """Whose channel it is in words, and its unit."""
@@ -249,7 +252,7 @@ class PlateRotation(OfPlates):
         centre = np.mean([plate.centre_m() for plate in plates], axis=0)
         force = wrench[:, :3]
         moment = wrench[:, 3:] - np.cross(centre, force)
-        true = Rotation.from_rotvec(values).as_matrix().T
+        true = Rotation.from_rotvec([*values]).as_matrix().T  # it refuses read-only arrays
         dforce, dmoment = force - force @ true, moment - moment @ true
         return np.hstack([dforce, dmoment + np.cross(centre, dforce)])
 

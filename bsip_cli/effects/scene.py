@@ -43,6 +43,7 @@ class Plate:
     wrench : (N, 6) on the body, about the world's origin; NaN where there is none.
     sensor_m : (3,) the point that its moments are about; the middle of its surface if unknown.
     zeroed : whether what it read without load in this trial has been taken off.
+    silent : (N,) where the file has 0 in all six, as software writes it for a plate without load.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Plate:
     wrench: np.ndarray
     sensor_m: np.ndarray | None = None
     zeroed: bool = False
+    silent: np.ndarray | None = None
 
     def centre_m(self) -> np.ndarray:
         """(3,) middle of the surface."""
@@ -118,7 +120,14 @@ class Scene:
         if stride == 1:
             return self
         part = slice(None, None, stride)
-        plates = tuple(replace(p, wrench=without_fast(p.wrench, stride)[part]) for p in self.plates)
+        plates = tuple(
+            replace(
+                p,
+                wrench=without_fast(p.wrench, stride)[part],
+                silent=None if p.silent is None else p.silent[part],
+            )
+            for p in self.plates
+        )
         wrench = None if self.wrench is None else without_fast(self.wrench, stride)[part]
         of_frames = ("times_s", "q", "v", "a", "valid", "residual_m")
         known = {name: getattr(self, name) for name in of_frames}
@@ -242,6 +251,10 @@ class Scene:
         """A point fixed in a segment, ``offset_m`` (3,) from the segment's origin."""
         i = self.person.skeleton.index(segment)
         return self.motion.point(i, self.person.origin_in_joint_m[i] + offset_m)
+
+    def centre(self, segment: str) -> Point:
+        """The centre of mass of a segment."""
+        return self.point(segment, self.centre_of(segment))
 
     def wrenches(self, segment: int) -> np.ndarray:
         """(N, 6, 10) ground wrench about the world's origin for each inertial parameter of a body

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 from scipy.signal import upfirdn
 
 from bsip_cli.recordings.model import Recording
@@ -74,6 +75,13 @@ def sample_at_frames(
     if ratio > 1 and abs(ratio - round(ratio)) < 1e-9 * ratio:
         return _decimated(clean, usable, round(ratio), n_frames)
     return _interpolated(clean, usable, signal_rate_hz, frame_rate_hz, n_frames)
+
+
+def silent_frames(sampled: np.ndarray, resampled: bool) -> np.ndarray:
+    """(n_frames,) where a plate's wrench (n_frames, 6) at the marker times was 0 in all channels,
+    as software writes it without load; a filter to another rate smears its neighbours into it."""
+    silent = (sampled == 0).all(axis=1)
+    return binary_dilation(silent, np.ones(2 * _HALF_LENGTH + 1)) if resampled else silent
 
 
 def _decimated(

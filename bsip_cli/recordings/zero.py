@@ -38,7 +38,7 @@ class PlateZero:
 
 
 def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = None) -> PlateZero:
-    """Find unloaded intervals: long, low and quiet in the vertical force.
+    """Find unloaded intervals: long, low and quiet in the vertical force, as an instrument reads.
 
     The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near, or the
     plate reads a steady pull: it was set to zero under the person.
@@ -47,7 +47,8 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
         return _zero_of(plate, pulled, rate_hz)
     width = max(1, round(_WINDOW_S * rate_hz))
     mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
-    is_quiet = plate.usable & (np.abs(mean - uniform_filter1d(mean, width)) < _QUIET_N)
+    heard = plate.usable & ~is_silent(plate.wrench())
+    is_quiet = heard & (np.abs(mean - uniform_filter1d(mean, width)) < _QUIET_N)
     unloaded = is_quiet & (np.abs(mean) < _LARGEST_N)
     if surely_free is not None and (free := is_quiet & surely_free).any():
         level = float(np.median(mean[free]))
@@ -73,6 +74,12 @@ def without_zeros(
             zeros[plate.name] = zero.offset.tolist()
     zeroed = replace(recording, plates=tuple(plate for plate, _ in done))
     return zeroed, [finding for _, finding in done], zeros
+
+
+def is_silent(wrench: np.ndarray) -> np.ndarray:
+    """(n,) where a reading (n, 6) is 0 in all channels, which no instrument reads: software wrote
+    it for a plate without load, and what the plate read there is not known."""
+    return np.asarray((wrench == 0).all(axis=-1))
 
 
 def is_noticed(offset: np.ndarray) -> bool:
@@ -102,6 +109,8 @@ def _zero_of(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> PlateZero:
 def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
     """The plate without its offset, and the line for the quality table."""
     found, action, level = "no quiet interval without load", "left its zero as it is", "info"
+    if is_silent(plate.wrench()).any():
+        found = "exactly 0 without load, as software writes it"
     if zero.is_known():
         seconds = sum(stop - start for start, stop in zero.stretches_s)
         force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])

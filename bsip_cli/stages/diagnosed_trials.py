@@ -197,7 +197,7 @@ def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
     """A constant force on each hand, of the size from which on it is reported."""
     force = support.LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
     for hand in support.HANDS:
-        place = scene.point(hand, scene.centre_of(hand)).position_m
+        place = scene.centre(hand).position_m
         arm = np.cross(place[:, None], force).swapaxes(1, 2)
         columns = np.concatenate([np.broadcast_to(force, arm.shape), arm], axis=1)
         term = FAULT + EFFECTS["unmeasured_contact"].name

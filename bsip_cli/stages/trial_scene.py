@@ -12,6 +12,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.inverse_kinematics import marker_residuals
+from bsip_cli.recordings.resample import silent_frames
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, markers_from, ordered_markers
 from bsip_cli.study.study import Trial
@@ -34,9 +35,14 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     scene = motion_and_wrench_of(unit, person, phi, trial)
     plates = plates_of(unit.read("plates", trial), unit.read("wrench", trial))
     zeros = unit.facts("wrench", trial).get("zeros", {})
+    rates = (unit.facts("markers", trial)[f"{what}_rate_hz"] for what in ("marker", "analog"))
+    resampled = not np.isclose(*rates)
     return replace(
         scene,
-        plates=tuple(replace(plate, zeroed=plate.name in zeros) for plate in plates),
+        plates=tuple(
+            replace(p, zeroed=p.name in zeros, silent=silent_frames(p.wrench, resampled))
+            for p in plates
+        ),
         robust_limit_m=unit.config.ik.robust_limit_m,
         residual_m=marker_residuals(person, scene.q, markers),
     )

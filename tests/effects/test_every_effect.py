@@ -77,6 +77,8 @@ def test_a_typical_size_is_possible_visible_and_in_words(effect, scene):
     if effect.name == "segment_inertia":
         values[4:] = 0
         values[1:4] = 0
+    values.setflags(write=False)  # as those of a table are
+    assert effect.change(scene, target, values).any()
     assert effect.possible(scene, target, values)
     assert np.abs(effect.change(scene, target, values)).max() > 0.1
     words = effect.words(scene, target, values)

@@ -77,6 +77,15 @@ def test_an_offset_is_not_shared_by_a_trial_whose_zero_was_taken_off():
     assert target in PlateZero().targets(zeroed)  # it may be wrong there for reasons of its own
 
 
+def test_a_plate_that_software_set_to_zero_shows_no_offset_there():
+    scene = moving()
+    first, *others = scene.plates
+    silent = np.arange(len(scene.times_s)) < 10
+    quiet = replace(scene, plates=(replace(first, silent=silent), *others))
+    change = PlateZero().change(quiet, f"{first.name} fz", np.array([10.0]))
+    assert not change[silent].any() and (change[~silent, 2] == 10.0).all()
+
+
 def test_the_plates_axes_are_its_own_with_z_up():
     plate = Plate("1", CORNERS, np.zeros((1, 6)))
     np.testing.assert_allclose(plate.axes(), [X, -Y, [0, 0, 1]], atol=1e-12)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bsip_cli.recordings.model import Plate
@@ -28,6 +30,19 @@ def test_offset_is_found_and_subtracted():
     corrected, finding = subtract_zero(plate, zero)
     assert finding.level == "corrected"
     assert abs(np.median(corrected.force_N[:900, 2])) < 0.3
+
+
+def test_zeros_that_software_wrote_are_no_reading():
+    load = np.zeros(4000)
+    load[1000:3000] = 700 * np.sin(np.linspace(0, np.pi, 2000))
+    plate = _plate(load)
+    silent = load == 0
+    force, moment = plate.force_N.copy(), plate.moment_Nm.copy()
+    force[silent] = moment[silent] = 0.0
+    plate = replace(plate, force_N=force, moment_Nm=moment)
+    zero = plate_zero(plate, RATE_HZ)
+    assert not zero.is_known()
+    assert subtract_zero(plate, zero)[1].found.startswith("exactly 0 without load")
 
 
 def test_a_plate_that_is_never_unloaded_keeps_its_zero():

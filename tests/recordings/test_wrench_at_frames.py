@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.model import Plate, Recording
-from bsip_cli.recordings.resample import sample_at_frames, wrench_at_marker_rate
+from bsip_cli.recordings.resample import sample_at_frames, silent_frames, wrench_at_marker_rate
 
 FRAMES = 200
 RATES = [(1000.0, 100.0), (2000.0, 120.0), (1000.0, 100.5), (100.0, 100.0), (240.0, 200.0)]
@@ -34,6 +34,16 @@ def test_slow_signal_has_no_delay(rate, frame_rate):
     values, _ = sample_at_frames(_signal(rate, 5.0, n), np.ones(n, bool), rate, frame_rate, FRAMES)
     expected = np.sin(2 * np.pi * 5.0 * np.arange(FRAMES) / frame_rate)
     np.testing.assert_allclose(values[15:-15, 0], expected[15:-15], atol=0.003)
+
+
+@pytest.mark.parametrize(("rate", "frame_rate"), RATES)
+def test_frames_in_which_software_wrote_zeros(rate, frame_rate):
+    n = int(FRAMES * rate / frame_rate)
+    signal = np.full((n, 6), 300.0)
+    signal[: n // 2] = 0.0
+    values, _ = sample_at_frames(signal, np.ones(n, bool), rate, frame_rate, FRAMES)
+    silent = silent_frames(values, resampled=rate != frame_rate)
+    assert abs(silent.sum() - FRAMES / 2) <= 1 and silent[: FRAMES // 2 - 1].all()
 
 
 def test_what_would_alias_is_gone():

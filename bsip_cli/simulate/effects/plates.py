@@ -182,14 +182,24 @@ class PlateGain(ChannelFault, name="plate_gain"):
         return (1.0 + self.size) * values
 
 
-class PlateZero(ChannelFault, name="plate_zero"):
+class OwnSignal(ChannelFault):
+    """Something is added to the channel, whatever it measures."""
+
+    def injected(self, instruments: Instruments) -> Instruments:
+        """What the software that wrote the file has set to zero stays so."""
+        changed = self.measured(instruments)
+        silent = (instruments.readings == 0).all(axis=2, keepdims=True)
+        return replace(changed, readings=np.where(silent, 0.0, changed.readings))
+
+
+class PlateZero(OwnSignal, name="plate_zero"):
     """A constant is added to the channel."""
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         return values + self.size
 
 
-class PlateDrift(ChannelFault, name="plate_drift"):
+class PlateDrift(OwnSignal, name="plate_drift"):
     """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ ALLOWED = {
     "caches": "",
     "motion": "body caches dynamics errors segments",
     "recordings": "body config errors files segments stated",
-    "statistics": "errors",
+    "statistics": "dynamics errors",
     "identification": "body config dynamics errors segments statistics",
     "effects": "body dynamics errors motion segments",
     "diagnosis": "body dynamics effects errors identification motion segments statistics",

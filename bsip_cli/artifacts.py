@@ -40,11 +40,14 @@ def empty_table(kind: str) -> pd.DataFrame:
 
 
 def table_of(kind: str, rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Rows as a table: of each the columns of this kind, which all must have."""
+    """Rows as a table: of each the columns of this kind, which all must have, and what there is of
+    its families of columns."""
     names = column_names(kind)
     if lacking := {name for row in rows for name in names if name not in row}:
         raise ValueError(f"{kind}: missing columns {sorted(lacking)}")
-    return pd.DataFrame(list(rows), columns=names)
+    others = (name for row in rows for name in row if name not in names)
+    families = dict.fromkeys(name for name in others if SCHEMAS[kind].column(name))
+    return pd.DataFrame(list(rows), columns=[*names, *families])
 
 
 def as_read(kind: str, frame: Rows) -> pd.DataFrame:

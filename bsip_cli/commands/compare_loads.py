@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -64,9 +64,8 @@ def compare_loads(
 
 def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, None, None]:
     for unit in units:
-        waiting = lacking(unit)
-        if waiting is not None:
-            yield replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
+        if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
+            yield waiting
             continue
         without_loads = unit.config_of_all.model_copy(update={"loads": ()})
         loads_off = Unit(_READER, unit.study, unit.out, without_loads, unit.participant)

@@ -28,13 +28,13 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.own_plates import SIDES
 from bsip_cli.running.runner import Outcome, held_alone, lacking
-from bsip_cli.running.session import OpenedStudy, follow, open_study
+from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from, person_of
 from bsip_cli.stages.joints import trial_of
 from bsip_cli.stages.trial_scene import plate_names
-from bsip_cli.study.study import Participant, describe_dataset
+from bsip_cli.study.study import describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
@@ -43,35 +43,6 @@ from bsip_cli.study.study import Participant, describe_dataset
 Texts = tuple[dict[str, str], str]
 # Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.
 _EDGE = 5
-
-
-def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callable | None) -> int:
-    """Write the tables of all trials; the exit code.
-
-    model : of a participant, writes the model and returns its file's name and the outcome.
-    """
-    study, (_, reads, options) = opened.study, _TABLES[asked.what]
-    names = tuple(reads.split()), (), tuple(options.split())
-    stage = Stage("export", "trial", "Tables of a trial.", *names)
-
-    def running() -> Generator[Outcome, None, None]:
-        for participant in study.participants:
-            name = ""
-            if model is not None:
-                name, outcome = model(participant)
-                yield outcome
-                if outcome.state != "done":
-                    continue
-            for trial in participant.trials:
-                unit = Unit(stage, study, out, opened.config, participant, trial)
-                yield _export_tables(unit, asked, name)
-
-    if asked.what == "bids" and asked.to is not None:
-        asked.to.mkdir(parents=True, exist_ok=True)
-        describe_dataset(asked.to, study.root)
-        shutil.copyfile(study.root / "participants.tsv", asked.to / "participants.tsv")
-    total = sum(len(one.trials) + (model is not None) for one in study.participants)
-    return follow("export", opened.refusals, running(), total, asked.to or out)
 
 
 def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
@@ -209,24 +180,37 @@ def export_session(
     _check(request)
     opened = open_study(root, out, chosen, config_file)
     skeleton = load_skeleton(opened.config.skeleton)
-    study, to = opened.study, request.to
-    if request.what == "recording":
+    study, to, what = opened.study, request.to, request.what
+    if what == "recording":
         assert to is not None
         return export_recordings(opened, out, to)
-    if request.what in ("bids", "joints"):
-        return _export_trials(opened, out, request, None)
-    if request.what == "opensim":
-        request = replace(request, formats=("osim",))
-    writers = _writers(request, skeleton)
+    writers: dict[str, Writer] = {}
+    if what == "model":
+        writers = _writers(request, skeleton)
+    elif what == "opensim":
+        writers = _writers(replace(request, formats=("osim",)), skeleton)
+    _, reads, options = _TABLES.get(what, (None, "", ""))
+    kinds = tuple(reads.split()), (), tuple(options.split())
+    of_trials = Stage("export", "trial", "Tables of a trial.", *kinds)
+    trials = {one.id: one.trials if what in _TABLES else () for one in study.participants}
 
-    def model(participant: Participant) -> tuple[str, Outcome]:
-        unit = Unit(_READER, study, out, opened.config, participant)
-        return _export(unit, skeleton, request, writers)
+    def running() -> Generator[Outcome, None, None]:
+        for participant in study.participants:
+            model, whole = "", (study, out, opened.config, participant)
+            if writers:
+                model, outcome = _export(Unit(_READER, *whole), skeleton, request, writers)
+                yield outcome
+                if outcome.state != "done":
+                    continue
+            for trial in trials[participant.id]:
+                yield _export_tables(Unit(of_trials, *whole, trial), request, model)
 
-    if request.what == "opensim":
-        return _export_trials(opened, out, request, model)
-    running = (model(participant)[1] for participant in study.participants)
-    return follow("export", opened.refusals, running, len(study.participants), to or out)
+    if what == "bids" and to is not None:
+        to.mkdir(parents=True, exist_ok=True)
+        describe_dataset(to, study.root)
+        shutil.copyfile(study.root / "participants.tsv", to / "participants.tsv")
+    total = sum(bool(writers) + len(own) for own in trials.values())
+    return follow("export", opened.refusals, running(), total, to or out)
 
 
 def _check(request: Request) -> None:

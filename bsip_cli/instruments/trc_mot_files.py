@@ -28,15 +28,6 @@ class Table:
     values: np.ndarray
 
 
-@dataclass(frozen=True)
-class ForceSet:
-    """The nine columns of one plate in a MOT table: force, point, torque."""
-
-    force: list[int]
-    point: list[int]
-    torque: list[int]
-
-
 def rewrite_trc_mot(
     trc: Path,
     copy: Path,
@@ -58,7 +49,7 @@ def rewrite_trc_mot(
     if mot is None:
         raise BadDataError("there are no forces next to it", expected="a .mot", file=trc)
     markers, forces = _read_trc(trc), _read_mot(mot)
-    sets = _force_sets(forces, mot)
+    sets = _columns_of_plates(forces, mot)
     scale = _scale_m(markers, trc)
     before = _instruments(markers, forces, sets, scale, trc)
     after = change(before)
@@ -135,7 +126,8 @@ def _scale_m(table: Table, file: Path) -> float:
     return METRES[unit]
 
 
-def _force_sets(table: Table, file: Path) -> list[ForceSet]:
+def _columns_of_plates(table: Table, file: Path) -> list[list[int]]:
+    """The nine columns of each plate: force, point, torque."""
     names = table.head[-1].split()
     column = {name: k for k, name in enumerate(names)}
     sets = []
@@ -145,8 +137,7 @@ def _force_sets(table: Table, file: Path) -> list[ForceSet]:
             wanted = [f"{prefix}_v{a}" for a in "xyz"] + [f"{prefix}_p{a}" for a in "xyz"]
             wanted += [f"{pattern}{a}" for a in "xyz"]
             if all(name in column for name in wanted):
-                at = [column[name] for name in wanted]
-                sets.append(ForceSet(at[:3], at[3:6], at[6:]))
+                sets.append([column[name] for name in wanted])
                 break
     if not sets:
         raise BadDataError(
@@ -156,7 +147,7 @@ def _force_sets(table: Table, file: Path) -> list[ForceSet]:
 
 
 def _instruments(
-    markers: Table, forces: Table, sets: list[ForceSet], scale: float, file: Path
+    markers: Table, forces: Table, sets: list[list[int]], scale: float, file: Path
 ) -> Instruments:
     labels = _trc_labels(markers.head)
     times, samples = markers.values[:, 1], forces.values[:, 0]
@@ -174,10 +165,9 @@ def _instruments(
     even = np.abs(times - times[0] - step * np.arange(len(times))).max() < UNEVEN_SHARE * step
     if not even and ratio != 1:
         raise BadDataError("the frames' times are uneven", expected="even ones", file=file)
-    plates = tuple(_plate(forces.values, each) for each in sets)
-    readings = np.stack(
-        [_reading(forces.values, each, plate) for each, plate in zip(sets, plates, strict=True)]
-    )
+    acting = [forces.values[:, columns] for columns in sets]
+    plates = tuple(map(_plate, acting))
+    readings = np.stack([_reading(*both) for both in zip(acting, plates, strict=True)])
     return Instruments(
         labels=tuple(labels),
         points_m=points,
@@ -197,31 +187,32 @@ def _up(readings: np.ndarray) -> np.ndarray:
     return np.eye(3)[int(np.argmax(np.abs(force)))]
 
 
-def _plate(values: np.ndarray, each: ForceSet) -> SensingPlate:
-    """A plate whose sensor lies where the force acts in the mean: the file has no better place."""
-    load = np.linalg.norm(np.nan_to_num(values[:, each.force]), axis=1)
-    loaded = (load > LOADED_N) & np.isfinite(values[:, each.point]).all(axis=1)
+def _plate(acting: np.ndarray) -> SensingPlate:
+    """A plate whose sensor lies where the force acts in the mean: the file has no better place;
+    acting (N, 9) force, point and torque."""
+    force, point, _ = np.hsplit(acting, 3)
+    load = np.linalg.norm(np.nan_to_num(force), axis=1)
+    loaded = (load > LOADED_N) & np.isfinite(point).all(axis=1)
     if not loaded.any():
         return SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
-    sensor = np.average(values[:, each.point][loaded], axis=0, weights=load[loaded])
+    sensor = np.average(point[loaded], axis=0, weights=load[loaded])
     return SensingPlate(np.eye(3), sensor, sensor)
 
 
-def _reading(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
+def _known(acting: np.ndarray, plate: SensingPlate) -> list[np.ndarray]:
+    """Force, point and torque (N, 3); the point is the sensor's in rows that do not say where."""
+    force, point, torque = np.hsplit(acting, 3)
+    return [force, np.where(np.isfinite(point), point, plate.sensor_m), np.nan_to_num(torque)]
+
+
+def _reading(acting: np.ndarray, plate: SensingPlate) -> np.ndarray:
     """(N, 6) force and its moment about the sensor."""
-    force = values[:, each.force]
-    moment = np.cross(_points_m(values, each, plate), force) + np.nan_to_num(values[:, each.torque])
-    return plate.reading(force, moment, np.zeros(3))
-
-
-def _points_m(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
-    """(N, 3) where the force acts; at the sensor in rows that do not say where."""
-    point = values[:, each.point]
-    return np.where(np.isfinite(point), point, plate.sensor_m)
+    force, point, torque = _known(acting, plate)
+    return plate.reading(force, np.cross(point, force) + torque, np.zeros(3))
 
 
 def _with_reading(
-    values: np.ndarray, each: ForceSet, plate: SensingPlate, reading: np.ndarray, up: np.ndarray
+    acting: np.ndarray, plate: SensingPlate, reading: np.ndarray, up: np.ndarray
 ) -> np.ndarray:
     """Nine columns (N, 9) for a reading (N, 6): the point moves in its plane.
 
@@ -229,8 +220,8 @@ def _with_reading(
     all are one place are no centres of pressure, and stay it.
     """
     force, moment = plate.lab_wrench(reading, np.zeros(3))
-    point, torque = _points_m(values, each, plate), np.nan_to_num(values[:, each.torque])
-    under_load = point[np.abs(values[:, each.force] @ up) > LOADED_N]
+    before, point, torque = _known(acting, plate)
+    under_load = point[np.abs(before @ up) > LOADED_N]
     if len(under_load) and np.ptp(under_load, axis=0).max() < STILL_M:
         return np.hstack([force, point, moment - np.cross(point, force)])
     level = np.eye(3) - np.outer(up, up)
@@ -263,17 +254,15 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
 
 def _new_mot(
     table: Table,
-    sets: list[ForceSet],
+    sets: list[list[int]],
     before: Instruments,
     after: Instruments,
     said: Sequence[str],
 ) -> str:
     first = before.first_frame_of(after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
-    for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
-        values[:, [*each.force, *each.point, *each.torque]] = _with_reading(
-            values, each, plate, reading, after.up
-        )
+    for columns, plate, reading in zip(sets, after.plates, after.readings, strict=True):
+        values[:, columns] = _with_reading(values[:, columns], plate, reading, after.up)
     values[:, 0] *= before.marker_hz / after.marker_hz
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
     head[-2:-2] = said  # before the line endheader and the names

@@ -7,12 +7,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
+from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash, fingerprint
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.running.unit import Unit, code_hash
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.study.study import Participant
+from bsip_cli.study.study import Participant, Study
 
 _MOVED = "what all persons together show has moved"
 
@@ -46,7 +47,8 @@ def stale_upstream(unit: Unit, participant: Participant | None, stages: Collecti
     before = {one.label for one in earlier if (one.level == "cohort") == of_group}
     before -= {stage.label for stage in stages}
     for stage in STAGES:
-        for other in units_of(stage, unit, participant) if stage.label in before else ():
+        whole = unit.study, unit.out, unit.config_of_all, participant, unit.left_out
+        for other in units_of(stage, *whole) if stage.label in before else ():
             refusal, kinds = other.refusal_path(), other.stage.writes
             if refusal.exists():  # what was refused as it stands, or is not there, is no lie
                 made_by = read_header(refusal, "refusal")["provenance"]["made_by"]
@@ -59,13 +61,18 @@ def stale_upstream(unit: Unit, participant: Participant | None, stages: Collecti
     return ""
 
 
-def units_of(stage: Stage, like: Unit, participant: Participant | None) -> Iterator[Unit]:
-    """A stage's units about a participant, or the group, in the study and with all options of
-    ``like``."""
+def units_of(
+    stage: Stage,
+    study: Study,
+    out: Path,
+    config: Config,
+    participant: Participant | None,
+    left_out: Mapping[str, str],
+) -> Iterator[Unit]:
+    """A stage's units about a participant, or the group."""
     trials = participant.trials if participant and stage.level == "trial" else (None,)
-    whole = like.study, like.out, like.config_of_all, participant
     for trial in trials:
-        yield Unit(stage, *whole, trial, left_out=like.left_out)
+        yield Unit(stage, study, out, config, participant, trial, left_out=left_out)
 
 
 @lru_cache(maxsize=64)

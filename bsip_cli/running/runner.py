@@ -20,7 +20,7 @@ from bsip_cli.artifacts import remove, remove_unfinished, write_artifact, write_
 from bsip_cli.config import Config
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer
-from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
+from bsip_cli.running.freshness import stale_upstream, units_of, was_changed, why_stale
 from bsip_cli.running.processes import Died, end_if_asked, work_on
 from bsip_cli.running.unit import Unit, code_hash, library_versions
 from bsip_cli.schemas import SCHEMAS
@@ -84,10 +84,7 @@ class _Task:
     def units(self, study: Study, left_out: Mapping[str, str]) -> Iterator[Unit]:
         """In order."""
         for stage in self.stages:
-            whole = stage, study, self.out, self.config, self.participant
-            of_trials = self.participant and stage.level == "trial"
-            for trial in self.participant.trials if self.participant and of_trials else (None,):
-                yield Unit(*whole, trial, left_out=left_out)
+            yield from units_of(stage, study, self.out, self.config, self.participant, left_out)
 
 
 def run_stages(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -180,17 +181,13 @@ def _rarity(
 def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.DataFrame:
     """Roots (P, P) of the covariance, by method."""
     rows = [
-        (segment, name, unit)
-        for segment in skeleton.body_names
+        (method, segment, name, unit)
+        for method, segment in product(roots, skeleton.body_names)
         for name, unit in zip(PARAMETERS, UNITS, strict=True)
     ]
-    tables = []
-    for method, root in roots.items():
-        table = pd.DataFrame(rows, columns=["segment", "parameter", "unit"])
-        table.insert(0, "method", method)
-        named = pd.DataFrame(root, columns=[f"root_{k}" for k in range(root.shape[1])])
-        tables.append(pd.concat([table, named], axis=1))
-    return pd.concat(tables, ignore_index=True)
+    table = pd.DataFrame(rows, columns=["method", "segment", "parameter", "unit"])
+    named = pd.DataFrame(np.vstack([*roots.values()])).add_prefix("root_")
+    return pd.concat([table, named], axis=1)
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

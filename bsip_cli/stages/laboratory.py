@@ -1,8 +1,5 @@
-"""laboratory (cohort): the faults of plates, clock and vertical by all persons together.
-
-Reads laboratory-information of all who have it, one after the other. Writes laboratory, and
-laboratory-sums, by which each person's diagnosis knows what the others show.
-"""
+"""laboratory: the faults of plates, clock and vertical, by what the sessions of each person show of
+them, and by all persons together."""
 
 from __future__ import annotations
 
@@ -15,24 +12,93 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis import laboratory_search
+from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.findings import interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
-from bsip_cli.diagnosis.shared_faults import STATED_MASS, Information
+from bsip_cli.diagnosis.shared_faults import (
+    STATED_MASS,
+    Information,
+    SharedTrial,
+    information_of,
+    inner,
+)
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, Number, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.scene import Scene
 from bsip_cli.report.cohort.laboratory import named_sentences
+from bsip_cli.report.words import count
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
+from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, is_weighed, prior_of, stated_sd
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.known_laboratory import information_in, pooled_rows
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study.study import Trial
 
+_LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.3 s on the plates
 _SAME_PLACE_M = (
     0.02  # of every corner: what laboratories meet of a plate that is not where it is said
 )
 _MOVED = 0.1  # of its standard deviation: less makes no diagnosis untrue
 _UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
+
+
+# --- what a person shows --------------------------------------------------------------------------
+
+
+def run_person(unit: Unit) -> None:
+    """Read motion, wrench, person and RM of all trials; write the information of each session."""
+    person = person_of(unit)
+    prior = prior_of(unit, person, whatever_mass=True)
+    seen: dict[str, list[tuple[Trial, Scene]]] = {}
+    for trial in unit.trials("kinematics", "wrench"):
+        scene = scene_of(unit, person, prior.phi, trial)
+        if trial.role != STATIC:
+            scene = inner(scene)
+        if scene.valid.any():
+            seen.setdefault(trial.session or "", []).append((trial, scene))
+    rows, sessions = [], {}
+    for session, mine in seen.items():
+        found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
+        usable = [one for one in found if one is not None and one.held is None]
+        if any(one.moves for one in usable):
+            scenes = [one.scene for one in usable if one.moves]
+            moments = np.concatenate([one.times_s[one.valid] - one.times_s[0] for one in scenes])
+            trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in usable]
+            rows += _session_rows(session, information_of(trials))
+            sessions[session] = {
+                "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
+                "trials": [one.trial.stem for one in usable],
+                # mean and standard deviation of those that show the clock, from each start
+                "moments_s": [float(moments.mean()), float(moments.std())],
+            }
+    if not sessions:
+        unit.warn(
+            f"{unit.name}: no trial has motion with every contact on a plate; it shows nothing of "
+            "the laboratory"
+        )
+    facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
+    unit.write("laboratory-information", rows, facts)
+
+
+def _session_rows(session: str, information: Information) -> list[dict]:
+    numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
+    return [
+        {
+            "session": session,
+            **vars(one),
+            **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
+            "trials": int(trials),
+            "pull": information.pull[k],
+            **{f"precision_{j}": x for j, x in enumerate(information.precision[k])},
+        }
+        for k, (one, parameter, trials) in enumerate(numbers)
+    ]
+
+
+# --- all together ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +118,8 @@ class _Session:
 
 
 def run(unit: Unit) -> None:
+    """Read laboratory-information of all who have it, one after the other; write laboratory, and
+    laboratory-sums, by which each person's diagnosis knows what the others show."""
     rows: list[dict] = []
     laboratories = _laboratories(list(_sessions(unit)))
     sums: list[dict] = []
@@ -81,9 +149,7 @@ def run(unit: Unit) -> None:
     for sentence in named_sentences(table):
         unit.warn(sentence)
     unit.write("laboratory", table, facts)
-    families = [name for row in sums for name in row if name.startswith(("precision_", "root_"))]
-    columns = [*column_names("laboratory-sums"), *dict.fromkeys(families)]
-    unit.write("laboratory-sums", pd.DataFrame(sums, columns=columns), facts)
+    unit.write("laboratory-sums", sums, facts)
 
 
 def _answer(unit: Unit, found: Mapping[str, laboratory_search.Laboratory]) -> dict:
@@ -222,10 +288,10 @@ def _counts(sessions: Sequence[_Session], cause: laboratory_search.Cause) -> tup
     persons, trials = set(), 0
     for one in sessions:
         counts: dict[bool, int] = {}  # in motion, and of who stands still
-        for c, count in zip(one.information.coordinates, one.information.trials, strict=True):
+        for c, n in zip(one.information.coordinates, one.information.trials, strict=True):
             mine = c.effect == cause.effect and c.target.split(" ")[1:] == channel
             if mine and plate in (ALL, c.target.split(" ")[0]):
-                counts[c.standing] = max(counts.get(c.standing, 0), int(count))
+                counts[c.standing] = max(counts.get(c.standing, 0), int(n))
         if counts:
             persons.add(one.person)
             trials += sum(counts.values())
@@ -256,11 +322,7 @@ def _sentence(
     counts: tuple[int, int],
 ) -> str:
     words, remedy = _words(cause, sizes), _effect(cause).remedy
-    people, recordings = (
-        f"{n} {word}{'s' * (n != 1)}"
-        for n, word in zip(counts, ("person", "recording"), strict=True)
-    )
-    shown = f"by {people} and {recordings}"
+    shown = f"by {count(counts[0], 'person')} and {count(counts[1], 'recording')}"
     if said == "named":
         return f"{words}, {shown}; to make sure, {remedy}"
     if said == "ambiguous":

@@ -1,22 +1,35 @@
-"""Report (participant): one HTML page; its figures and the numbers behind them as files."""
+"""Report, of a participant and of the cohort: one HTML page; its figures and numbers as files."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
 
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
-from bsip_cli.report.blocks import FILES, Document, Grid, Picture, render
+from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
+from bsip_cli.report.cohort import record as cohort
+from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.recordings import large_finding, light_for, must_wait
-from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord, with_all_causes
-from bsip_cli.report.words import ROLES, trial_label
+from bsip_cli.report.records import (
+    HowMade,
+    Origin,
+    ParticipantRecord,
+    Refusal,
+    TrialRecord,
+    with_all_causes,
+)
+from bsip_cli.report.tables.build import build_tables
+from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import load_words, person_of
+from bsip_cli.statistics.cohort import Criteria
+from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 
 _KINDS = ("quality", "kinematics", "marker-events", "reconstruction", "fit", "joint-moments")
@@ -135,3 +148,101 @@ def origin_of(path: Path, label: str) -> Origin:
     known = ("stage", "bsip_version", "libraries", "options", "inputs")
     made = {name: made_by[name] for name in known}
     return Origin(label, messages=tuple(provenance["messages"]), **made)
+
+
+# --- the cohort ---------------------------------------------------------------------------------
+
+
+def run_group(unit: Unit) -> None:
+    document = cohort_document(cohort_record_of(unit))
+    unit.write("group-report-files", file_rows(unit.out, write_page(unit, document)))
+
+
+def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
+    """Everything that is there of the whole study."""
+    facts = unit.facts("values")
+    criteria = Criteria(unit.config.stats.alpha, unit.config.stats.equivalence_percent)
+    compared = unit.read("comparisons")
+
+    def read(table: str, variable: str) -> pd.DataFrame:
+        return unit.read("values", table=[table], variable=[variable])
+
+    choices = {one.id: _read(unit, "choice", one) for one in unit.study.participants}
+    # the table's parameters where nothing was chosen
+    use = {name: str(rows["use"].iloc[0]) if len(rows) else RM for name, rows in choices.items()}
+    errors = cohort.yardsticks_of(read, use)
+    return cohort.CohortRecord(
+        members=tuple(
+            _member(unit, person, use[person.id], errors.get(person.id, {}))
+            for person in unit.study.participants
+        ),
+        ratios=cohort.ratios_of(read),
+        tables=build_tables(compared, criteria, facts["fitted_on"], facts["missing"]),
+        table_files=tuple(unit.read("tables-files")["file"]),
+        missing=tuple(
+            f"{gone['sentence']}: not in table{'s' if len(gone['tables']) > 1 else ''} "
+            + listing([tag.removeprefix("table") for tag in gone["tables"]])
+            for gone in facts["missing"]
+        ),
+        made=HowMade.of(_origins_of_all(unit)),
+        defaults=unit.shipped_options(),
+        laboratory=unit.read("laboratory") if unit.has("laboratory") else None,
+    )
+
+
+def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
+    """A participant's table; empty where there is none."""
+    there = unit.path(kind, participant=participant).exists()
+    return unit.read(kind, participant=participant) if there else pd.DataFrame()
+
+
+def _member(
+    unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]
+) -> cohort.Member:
+    identified = _read(unit, "identification", participant)
+    if len(identified):
+        identified = identified[identified["method"] == OM]
+    shown = {"person": _read(unit, "person", participant), "identification": identified}
+    first = {
+        kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
+        for kind, rows in shown.items()
+    }
+    has_page, was_searched = (
+        unit.path(kind, participant=participant).exists()
+        for kind in ("report-files", "overall-diagnosis")
+    )
+    searched, light = None, None
+    if was_searched:
+        facts = unit.facts("overall-diagnosis", participant=participant)
+        diagnosis = unit.read("overall-diagnosis", participant=participant)
+        searched = cohort.searched(participant.id, diagnosis, facts)
+    if has_page:
+        light = Light(**unit.facts("report-files", participant=participant)["light"])
+    return cohort.Member(
+        participant.id,
+        first["person"],
+        first["identification"],
+        has_page,
+        refusals_of(unit, participant),
+        searched,
+        use if errors else "",
+        errors,
+        light,
+    )
+
+
+def _origins_of_all(unit: Unit) -> Iterator[Origin]:
+    """Of all that is read; a participant's own facts are no options of the group, and what a
+    diagnosis found has its section."""
+    for kind in unit.stage.inputs:
+        if SCHEMAS[kind].level == "cohort":
+            if unit.has(kind):
+                yield origin_of(unit.path(kind), "")
+        else:
+            paths = {p.id: unit.path(kind, participant=p) for p in unit.study.participants}
+            for name, path in paths.items():
+                if path.exists():
+                    origin = origin_of(path, name)
+                    origin.options.pop("participant", None)
+                    found = kind in ("overall-diagnosis", "report-files")
+                    yield replace(origin, messages=()) if found else origin

@@ -17,13 +17,13 @@ from bsip_cli.artifacts import file_rows, write_bytes
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.report.tables.build import RENDERERS, build_tables, folder
+from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
     DIFFERENCE,
     PAIR,
     Comparison,
-    CorrelationRun,
     Criteria,
     PersonTestCounts,
     Topic,
@@ -113,7 +113,8 @@ class _Cohort:
         recordings = list(self._recordings(participant))
         if recordings and not any(recording.role == "sequence" for recording in recordings):
             self._lacks(f"{participant.id} has no identification trial", 2, 3, 6)
-        tests = person_tests("table5", (c for each in recordings for c in _correlations(each)))
+        runs = (run for recording in recordings for run in _correlations(recording))
+        tests = person_tests(participant.id, runs)
         self._tests.add(tests)
         masses, centres = _of_parameters(participant, bsip) if bsip is not None else ([], [])
         of_trials = [value for recording in recordings for value in _of_recording(recording)]
@@ -132,9 +133,8 @@ class _Cohort:
     def _lacks(self, what: str, *numbers: int, is_reported: bool = False) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers: a message says it,
         unless that is done."""
-        *others, last = map(str, numbers)
-        tables = f"tables {', '.join(others)} and {last}" if others else f"table {last}"
         if not is_reported:
+            tables = f"table{'s' * (len(numbers) > 1)} {listing([*map(str, numbers)])}"
             self._unit.warn(f"{what}: not in {tables}")
         self._missing.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
 
@@ -266,14 +266,14 @@ def _of_fit(recording: Recording, method: str, fits: dict[str, dict]) -> Iterato
         yield recording.value("table6", "moment_residual", method, moment, "N m")
 
 
-def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
+def _correlations(recording: Recording) -> Iterator[tuple[Topic, tuple[float, ...]]]:
     trial, frame = recording.trial, recording.frames.get("correlation-difference", pd.DataFrame())
     for row in frame.to_dict("records"):
         if row["component"] not in COMPONENTS or {row["method_a"], row["method_b"]} != {OM, RM}:
             continue
         om, rm = ("r_a", "r_b") if row["method_a"] == OM else ("r_b", "r_a")
-        place = (trial.participant_id, trial.stem, trial.task, recording.role, row["component"])
-        yield CorrelationRun(*place, row[om], row[rm], row["r_ab"], row["n_effective"])
+        topic = Topic("table5", f"{row['component']}_r", trial.task, recording.role, "1")
+        yield topic, (row[om], row[rm], row["r_ab"], row["n_effective"])
 
 
 # --- the papers' tables ---------------------------------------------------------------------------

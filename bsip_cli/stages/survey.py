@@ -130,27 +130,22 @@ def _surveyed(
     written: Written = AS_WRITTEN,
     gains: Mapping[str, float] = NO_GAINS,
 ) -> list[TrialSamples]:
-    """Of the recordings that can be read."""
-    every = (_survey(unit, trial, limits, written, gains) for trial in trials)
-    return [one for one in every if one is not None]
-
-
-def _survey(
-    unit: Unit, trial: Trial, limits: GateLimits, written: Written, gains: Mapping[str, float]
-) -> TrialSamples | None:
-    """None where the recording cannot be read: its own turn will say why."""
-    try:
-        found = opened(unit, trial, written, gains)
-    except BadDataError:
-        return None
-    seen = TrialSamples.of(found, limits)
-    if seen.height_m is not None and no_person(seen.height_m, unit.person.height_m):
+    """Of the recordings that can be read; of the others their own turn will say why."""
+    seen = []
+    for trial in trials:
         try:
-            person_of(found.recording.labels, bones, prefix_of(unit))
-        except BadDataError as two:  # people are no giant
-            raise BadDataError(
-                two.found, expected=two.expected, remedy=two.remedy, file=trial.path
-            ) from two
+            found = opened(unit, trial, written, gains)
+        except BadDataError:
+            continue
+        one = TrialSamples.of(found, limits)
+        if one.height_m is not None and no_person(one.height_m, unit.person.height_m):
+            try:
+                person_of(found.recording.labels, bones, prefix_of(unit))
+            except BadDataError as two:  # people are no giant
+                raise BadDataError(
+                    two.found, expected=two.expected, remedy=two.remedy, file=trial.path
+                ) from two
+        seen.append(one)
     return seen
 
 

@@ -325,21 +325,6 @@ def _tests_of_topic(
 
 
 @dataclass(frozen=True)
-class CorrelationRun:
-    """Correlations of one trial and component, and the independent samples they rest on."""
-
-    participant: str
-    trial: str
-    task: str
-    role: str
-    component: str
-    r_om: float
-    r_rm: float
-    r_om_rm: float
-    n_effective: float
-
-
-@dataclass(frozen=True)
 class PersonTest:
     """Both tests of one participant, task and component; positive where OM correlates better."""
 
@@ -358,24 +343,26 @@ class PersonTest:
         return tuple(Value(*place, name, PAIR, number, "1") for name, number in named)
 
 
-def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest, ...]:
-    """One test per participant, task and component.
+def person_tests(
+    participant: str, runs: Iterable[tuple[Topic, Sequence[float]]]
+) -> tuple[PersonTest, ...]:
+    """One test per task and component of a participant.
+
+    runs : what a trial's correlations are about; those of the measured signal with OM's and RM's,
+    that of these two, and the independent samples that they rest on.
 
     Over several runs of a task the correlations are averaged and the samples added up: the mean
     of correlation matrices is one again, and independent recordings add their samples.
     """
-    groups: dict[tuple[str, Topic], list[CorrelationRun]] = defaultdict(list)
-    for run in runs:
-        topic = Topic(table, f"{run.component}_r", run.task, run.role, "1")
-        groups[run.participant, topic].append(run)
+    groups: dict[Topic, list[Sequence[float]]] = defaultdict(list)
+    for topic, numbers in runs:
+        groups[topic].append(numbers)
     tests = []
-    for (participant, topic), group in groups.items():
-        known = [run for run in group if not isnan(run.r_om + run.r_rm + run.r_om_rm)]
-        r_om, r_rm, r_om_rm = (
-            float(np.mean([getattr(run, name) for run in known])) if known else nan
-            for name in ("r_om", "r_rm", "r_om_rm")
-        )
-        n = float(sum(run.n_effective for run in known)) if known else nan
+    for topic, group in groups.items():
+        known = [numbers for numbers in group if not isnan(sum(numbers[:3]))] or [(nan,) * 4]
+        *correlations, counts = zip(*known, strict=True)
+        r_om, r_rm, r_om_rm = (float(np.mean(one)) for one in correlations)
+        n = float(sum(counts))
         williams, fisher = williams_t(r_om, r_rm, r_om_rm, n), fisher_z_difference(r_om, n, r_rm, n)
         tests.append(PersonTest(participant, topic, williams, fisher))
     return tuple(tests)

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from bsip_cli.dynamics.lowpass import valid_intervals
+
 # --- what a test gives ----------------------------------------------------------------------------
 
 
@@ -172,15 +174,6 @@ Intervals = Sequence[tuple[int, int]]
 """(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
 
 
-def intervals_of(valid: ArrayLike) -> list[tuple[int, int]]:
-    """The runs of True in a (n,) boolean array, in order."""
-    flags = np.asarray(valid, dtype=bool)
-    if flags.ndim != 1:
-        raise ValueError(f"valid must be one-dimensional, not of shape {flags.shape}")
-    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
-
-
 def finite_intervals(
     intervals: Intervals | None, *signals: NDArray[np.float64]
 ) -> list[tuple[int, int]]:
@@ -207,7 +200,7 @@ def finite_intervals(
     return [
         (start + first, start + last)
         for start, stop in ordered
-        for first, last in intervals_of(finite[start:stop])
+        for first, last in valid_intervals(finite[start:stop])
     ]
 
 

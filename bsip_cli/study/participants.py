@@ -66,22 +66,15 @@ class Column:
     legend: Mapping[str, Sex] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Columns by their names in the contract, and what is wrong with the header."""
-
-    known: Mapping[str, Column]
-    faults: tuple[str, ...]
-
-
 def columns_in(header: Sequence[str]) -> list[Column]:
     """All columns that are understood; the others are ignored."""
     return [column for k, title in enumerate(header) if (column := _column(k, title))]
 
 
-def columns_of(header: Sequence[str]) -> Columns:
-    """The columns of a table by its titles, and what is wrong with these."""
-    faults, known = [], {}
+def columns_of(header: Sequence[str]) -> tuple[dict[str, Column], list[str]]:
+    """The columns of a table by their names in the contract, and what is wrong with its titles."""
+    faults: list[str] = []
+    known: dict[str, Column] = {}
     found = columns_in(header)
     for name in KNOWN:
         own = [column for column in found if column.name == name]
@@ -99,7 +92,7 @@ def columns_of(header: Sequence[str]) -> Columns:
     named = {*known, *(c.name for c in found), *(name for _, name in near)}
     if lost := [name for name in REQUIRED if name not in named]:
         faults.append(f"has no column {', '.join(lost)}")
-    return Columns(known, tuple(faults))
+    return known, faults
 
 
 def _column(index: int, title: str) -> Column | None:
@@ -134,13 +127,14 @@ def _misspelt(titles: Sequence[str], lacking: Sequence[str]) -> list[tuple[str, 
 # --- participants.json ----------------------------------------------------------------------------
 
 
-def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
-    """With legend and units of the JSON that BIDS puts next to the table; and what is to be said.
+def add_sidecar(known: dict[str, Column], faults: list[str], file: Path) -> list[str]:
+    """Legend and units of the JSON that BIDS puts next to the table, and what is wrong with them,
+    to what its header says; returns what is to be said.
 
     A legend in the table's own header goes before it.
     """
     if not file.exists():
-        return columns, []
+        return []
     try:
         if fault := fault_of(file):
             raise ValueError(fault)
@@ -150,8 +144,7 @@ def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
         if not isinstance(said, dict):
             raise ValueError("no object of columns")
     except (OSError, ValueError, RecursionError) as error:
-        return columns, [f"{file}: is not used: {error}"]
-    known, faults = dict(columns.known), list(columns.faults)
+        return [f"{file}: is not used: {error}"]
     for name, column in known.items():
         about = said.get(column.title, said.get(name))
         if not isinstance(about, dict):
@@ -171,7 +164,7 @@ def with_sidecar(columns: Columns, file: Path) -> tuple[Columns, list[str]]:
             if not column.unit and not unit:
                 faults.append(f"has a column {column.title!r}, whose unit {text!r} is not known")
             known[name] = replace(column, unit=column.unit or unit)
-    return Columns(known, tuple(faults)), []
+    return []
 
 
 NAME = re.compile(r"sub-[A-Za-z0-9]+")
@@ -251,10 +244,11 @@ def read_people(file: Path) -> PeopleTable:
     table = read_text_table(file, lambda names: len({c.name for c in columns_in(names)}))
     if not table.rows:
         raise _header_fault(file, ["names no participant"])
-    columns, notes = with_sidecar(columns_of(table.header), file.with_suffix(".json"))
-    if columns.faults:
-        raise _header_fault(file, columns.faults)
-    index = columns.known["participant_id"].index
+    known, faults = columns_of(table.header)
+    notes = add_sidecar(known, faults, file.with_suffix(".json"))
+    if faults:
+        raise _header_fault(file, faults)
+    index = known["participant_id"].index
     rows, renamed = [], []
     for cells in table.rows:
         written = cells[index] if index < len(cells) else ""
@@ -268,7 +262,7 @@ def read_people(file: Path) -> PeopleTable:
     if renamed:
         notes.append(f"{file}: {', '.join(renamed)}, by their folders")
     width, separator = len(table.header), table.separator
-    return PeopleTable(file, width, separator, columns.known, tuple(rows), tuple(notes))
+    return PeopleTable(file, width, separator, known, tuple(rows), tuple(notes))
 
 
 def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:

@@ -35,7 +35,7 @@ ALLOWED = {
     "caches": "",
     "motion": "body caches dynamics errors segments",
     "recordings": "body config errors files segments stated",
-    "statistics": "errors",
+    "statistics": "dynamics errors",
     "identification": "body config dynamics errors segments statistics",
     "effects": "body dynamics errors motion segments",
     "diagnosis": "body dynamics effects errors identification motion segments statistics",
@@ -135,7 +135,7 @@ def test_the_fitted_side_does_not_know_the_simulator():
 
 
 def test_stages_do_not_know_each_other():
-    """They meet in files; two reports share their writing of files."""
+    """They meet in files."""
     helpers = {
         "stages.diagnose_trial",
         "stages.frames",
@@ -145,7 +145,6 @@ def test_stages_do_not_know_each_other():
         "stages.person_mass",
         "stages.reconstruct",
         "stages.survey",
-        "stages.report",
         "stages.trial_scene",
     }
     pairs = {

@@ -12,6 +12,12 @@ def holed(count, seed):
     return valid
 
 
+def test_runs_of_true():
+    assert valid_intervals(np.array([0, 1, 1, 0, 1])) == [(1, 3), (4, 5)]
+    assert valid_intervals(np.array([])) == []
+    assert valid_intervals(np.array([True, True])) == [(0, 2)]
+
+
 @pytest.mark.parametrize("stride", [1, 4, 7])
 def test_rows_sum_to_one(stride):
     operator, frames = lowpass_operator(holed(500, 1), 100.0, 8.0, stride)

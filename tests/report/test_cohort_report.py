@@ -15,7 +15,7 @@ from bsip_cli.report.cohort.record import CohortRecord, Ratios
 from bsip_cli.report.records import HowMade
 from bsip_cli.report.words import MISSING
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.group_report import record_of
+from bsip_cli.stages.report import cohort_record_of
 from tests.report.fake_study import Artifacts, pictures_of
 
 
@@ -75,7 +75,7 @@ def test_person_of_whom_nothing_was_identified(reports, tmp_path):
 
 
 def test_empty_cohort_gives_sentences(reports):
-    record = record_of(reports.unit("report"))
+    record = cohort_record_of(reports.unit("report"))
     none = Ratios({}, held_out=False)
     bare = CohortRecord(record.members[2:], none, (), (), (), HowMade(), record.defaults)
     document = cohort_document(bare)
@@ -87,7 +87,7 @@ def test_empty_cohort_gives_sentences(reports):
 
 
 def test_one_person_is_not_tested(reports):
-    record = record_of(reports.unit("report"))
+    record = cohort_record_of(reports.unit("report"))
     document = cohort_document(replace(record, members=record.members[:1]))
     (tables,) = [one for one in document.sections if one.anchor == "tables"]
     said, files = tables.blocks
@@ -146,7 +146,7 @@ def laboratory(verdict: str, probability: float) -> pd.DataFrame:
 
 
 def of_laboratory(reports, table: pd.DataFrame | None) -> tuple[str, list[list[str]]]:
-    record = replace(record_of(reports.unit("report")), laboratory=table)
+    record = replace(cohort_record_of(reports.unit("report")), laboratory=table)
     document = cohort_document(record)
     (section,) = [one for one in document.sections if one.anchor == "laboratory"]
     said = (*document.front, *section.blocks)

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.blocks import _tied
 from bsip_cli.report.errors import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.figures.canvas import middle_of_longest, plain, thinned
@@ -17,7 +18,6 @@ from bsip_cli.report.words import (
     significant,
     trial_label,
 )
-from bsip_cli.statistics.samples import intervals_of
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_labels_lose_mathematics_and_control_signs():
 
 
 def test_runs_and_thinning():
-    assert intervals_of(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
-    assert intervals_of(np.zeros(3, dtype=bool)) == []
+    assert valid_intervals(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
+    assert valid_intervals(np.zeros(3, dtype=bool)) == []
     assert len(np.arange(100_000)[thinned(100_000)]) <= 1200
 
 

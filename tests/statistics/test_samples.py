@@ -10,7 +10,6 @@ from bsip_cli.statistics.samples import (
     effective_samples,
     effective_samples_of_pair,
     finite_intervals,
-    intervals_of,
     lilliefors_test,
 )
 
@@ -76,12 +75,6 @@ def test_no_answer(x):
 
 
 # --- intervals ------------------------------------------------------------------------------------
-
-
-def test_runs_of_true():
-    assert intervals_of([0, 1, 1, 0, 1]) == [(1, 3), (4, 5)]
-    assert intervals_of([]) == []
-    assert intervals_of([True, True]) == [(0, 2)]
 
 
 def test_split_at_what_is_not_finite_and_keep_given_breaks():

@@ -15,9 +15,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.errors import printable
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
-from bsip_cli.statistics.samples import intervals_of
 
 WIDTH_MM = 170.0  # the text width of a page
 INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
@@ -117,7 +117,7 @@ def thinned(length: int, most: int = MOST_POINTS) -> slice:
 
 def middle_of_longest(time_s: np.ndarray, flags: np.ndarray, seconds: float) -> slice:
     """Up to ``seconds`` from the middle of the longest interval where ``flags`` holds."""
-    intervals = intervals_of(flags)
+    intervals = valid_intervals(flags)
     if not intervals:
         return slice(0, 0)
     first, end = max(intervals, key=lambda pair: pair[1] - pair[0])

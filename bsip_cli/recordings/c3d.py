@@ -305,7 +305,13 @@ def _plate_unit(
     if corners_are_plausible(written * length_unit_m):
         return length_unit_m, []
     sizes = {unit: size for unit in _PLATE_UNITS if (size := length_in_m(unit)) is not None}
-    fitting = {unit: size for unit, size in sizes.items() if _is_usual_plate(written * size)}
+    low, high = _USUAL_SIDES_M
+    fitting = {
+        unit: size
+        for unit, size in sizes.items()
+        if low <= (sides := side_lengths(written * size)).min() and sides.max() <= high
+        if corners_are_plausible(written * size)
+    }
     found, expected = _sides(written * length_unit_m), "a rectangle of 0.1 to 5 m"
     if len(fitting) != 1:
         raise _UnusablePlateError(f"corners that are no plate: {found}", expected)
@@ -331,11 +337,6 @@ def _without_place(stated: PlateDescription) -> tuple[PlateDescription, list[Fin
     action = "took the moments about the middle of its surface"
     about = Finding("plate_origin", stated.name, found, expected, action, "corrected")
     return replace(stated, origin_m=np.zeros(3)), [about]
-
-
-def _is_usual_plate(corners_m: np.ndarray) -> bool:
-    (low, high), sides = _USUAL_SIDES_M, side_lengths(corners_m)
-    return corners_are_plausible(corners_m) and bool(low <= sides.min() and sides.max() <= high)
 
 
 def _sides(corners_m: np.ndarray) -> str:

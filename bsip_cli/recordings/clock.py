@@ -145,7 +145,8 @@ def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict
 
 def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, ...]:
     """As `Lags` has it from ``kept`` on."""
-    later = _shifted(total, by)
+    rows, there = later_samples(len(total), by)
+    later = np.where(there[:, None], total[rows], np.nan)
     kept = float(np.isfinite(later).all(axis=1).mean())
     part = Delay(kept=kept).limits(limits)
     balance = Balance.of(body, later, part)
@@ -181,9 +182,3 @@ def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
     same_way = np.sign(np.log(PACES)) == np.sign(np.log(PACES[best]))
     surely = np.exp(logsumexp(logs[same_way]) - logsumexp(logs))
     return float(PACES[best]) if surely >= percent / 100 else 1.0
-
-
-def _shifted(values: np.ndarray, by: int) -> np.ndarray:
-    """Each row's ``by``-th after it, NaN where there is none."""
-    rows, there = later_samples(len(values), by)
-    return np.where(there[:, None], values[rows], np.nan)

@@ -14,7 +14,7 @@ from bsip_cli.recordings.analog import long_runs, runs, times
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.resample import FrameWrench
-from bsip_cli.recordings.under_the_feet import outline
+from bsip_cli.recordings.under_the_feet import lowest, outline
 
 NO_MASS = (
     "whether something else bears the person (seat, box, hands) is not known: neither a stated "
@@ -89,14 +89,10 @@ class FootContacts:
     reasons: tuple[Finding, ...]
 
     @property
-    def has_both(self) -> bool:
-        """Both feet have markers; a foot without any may stand anywhere."""
-        return set(self.on_ground) == {"l", "r"}
-
-    @property
     def surely_measured(self) -> np.ndarray:
-        """``measured`` where both feet are seen, (n_frames,) bool."""
-        return self.measured & self.has_both
+        """``measured`` where both feet have markers, (n_frames,) bool: one without may stand
+        anywhere."""
+        return self.measured & (set(self.on_ground) == {"l", "r"})
 
 
 def foot_contacts(
@@ -150,9 +146,9 @@ def contact_windows(
             reasons += (_finding("", NO_MASS),)
         nothing = np.zeros(len(feet.measured), bool)
         return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
-    balance = _vertical_forces(feet.total_N, trunk_markers_m, mass_kg, rate_hz)
-    mismatch = np.zeros_like(feet.measured)
-    if balance is not None:
+    mismatch, balance = np.zeros_like(feet.measured), None
+    if (reach := reach_m_s2(trunk_markers_m, rate_hz)) is not None:
+        balance = low_pass(feet.total_N, rate_hz), mass_kg * reach  # measured, needed
         mismatch = _mismatch(*balance, mass_kg * GRAVITY_M_S2, rate_hz)
     shortest = round(_LEAST_WINDOW_S * rate_hz)
     valid = long_runs(feet.measured & ~mismatch, shortest)
@@ -185,9 +181,8 @@ class _Foot:
     def of(cls, markers_m: np.ndarray, rate_hz: float) -> _Foot:
         """A marker's standing height is the 2nd percentile of its heights."""
         known = np.isfinite(markers_m).all(axis=-1)
-        columns = zip(markers_m[..., 2].T, known.T, strict=True)
-        height0_m = np.array([np.percentile(z[k], 2) if k.any() else 0.0 for z, k in columns])
-        height = np.where(known, np.nan_to_num(markers_m[..., 2]) - height0_m, np.inf)
+        height_m = np.where(known, markers_m[..., 2], np.nan)
+        height = np.nan_to_num(height_m - lowest(height_m), nan=np.inf)
         frames, reach = np.arange(len(markers_m)), max(1, round(0.02 * rate_hz))
         after, before = np.minimum(frames + reach, frames[-1:]), np.maximum(frames - reach, 0)
         span = np.maximum(after - before, 1)[:, None, None]  # about 40 ms
@@ -252,14 +247,6 @@ def _finding(subject: str, found: str) -> Finding:
 
 
 # --- the balance of vertical forces ---------------------------------------------------------------
-
-
-def _vertical_forces(
-    total_force_z_N: np.ndarray, trunk_markers_m: np.ndarray, mass_kg: float, rate_hz: float
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """What the plates measure, and what the trunk's motion needs, (n_frames,) each."""
-    reach = reach_m_s2(trunk_markers_m, rate_hz)
-    return None if reach is None else (low_pass(total_force_z_N, rate_hz), mass_kg * reach)
 
 
 def _mismatch(

@@ -298,24 +298,21 @@ class Hypothesis:
             for repair, fit in zip(repairs, fits, strict=True):
                 possible.setdefault(repair, {})[name] = fit
         for repair, every in possible.items():
-            some = {name: fit for name, fit in every.items() if self._is_other(name, fit)}
+            some = {n: fit for n, fit in every.items() if fit.reading != self.fits[n].reading}
             if repair != AS_STATED and some:
                 yield self._with(some)
                 yield from (self._with({name: fit}) for name, fit in some.items() if len(some) > 1)
         for pair in combinations(self.fits, 2):
             if all(name in trial.sources for trial in self.trials for name in pair):
-                yield self._with({a: self._in_place_of(a, b) for a, b in (pair, pair[::-1])})
-
-    def _is_other(self, name: str, fit: PlateFit) -> bool:
-        return fit.reading != self.fits[name].reading
+                exchanged = {}
+                for name, other in (pair, pair[::-1]):
+                    place = self.fits[other].reading.place_of or other
+                    reading = replace(self.fits[name].reading, place_of=place * (place != name))
+                    (exchanged[name],) = plate_fits(self.trials, name, [reading])
+                yield self._with(exchanged)
 
     def _with(self, fits: Mapping[str, PlateFit]) -> Hypothesis:
         return Hypothesis(self.frame, self.trials, self.body, {**self.fits, **fits}, self.limits)
-
-    def _in_place_of(self, name: str, other: str) -> PlateFit:
-        place = self.fits[other].reading.place_of or other
-        reading = replace(self.fits[name].reading, place_of=place * (place != name))
-        return plate_fits(self.trials, name, [reading])[0]
 
 
 def _with(repair: PlateReading, now: PlateReading) -> PlateReading:

@@ -35,9 +35,8 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
 from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
-_VALUES_PER_BYTE = (
-    5  # of both files: a grid of forces may need as much memory as c3d_content allows
-)
+# Of both files: a grid of forces may need as much memory as c3d_content allows.
+_VALUES_PER_BYTE = 5
 _MM = 1e-3
 _UNEVEN = "the times of the .mot do not increase evenly"
 _WHAT = "times of the forces"

@@ -65,7 +65,11 @@ class TrialSamples:
         recording = opened.recording
         markers, rate_hz = recording.markers_m, recording.analog_rate_hz
         segments = by_segment(recording.labels, markers)
-        heavy = {s.name: _heavy(np.where(s.usable, lift_N(s), 0.0)) for s in opened.sources}
+        heavy = {}
+        for source in opened.sources:
+            size = np.abs(np.where(source.usable, lift_N(source), 0.0))
+            most = np.percentile(size, 99) if len(size) else 0.0
+            heavy[source.name] = size > max(LOADED_N, 0.5 * most)
         sources = opened.sources if any(mask.any() for mask in heavy.values()) else ()
         few = [np.flatnonzero(heavy[s.name]) for s in sources]
         few = [some[:: max(1, len(some) // _FEW)] for some in few]
@@ -119,8 +123,3 @@ def _mass_kg(opened: Opened) -> float:
     carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
     loaded = carried[carried > _LOADED * carried.max(initial=0.0)]
     return float(np.percentile(loaded, 90)) if len(loaded) else 0.0
-
-
-def _heavy(lift_N: np.ndarray) -> np.ndarray:
-    size = np.abs(lift_N)
-    return size > max(LOADED_N, 0.5 * np.percentile(size, 99)) if len(size) else size > 0

@@ -34,9 +34,7 @@ def mjcf_text(body: IdentifiedPerson) -> str:
         above = elements[parent] if parent >= 0 else world
         elements.append(_add_body(above, body, i))
     for name, segment, place in body.markers():
-        own = elements[
-            segment
-        ]  # sites go before the child bodies, which is how such files are read
+        own = elements[segment]  # sites go before the child bodies: such files are read so
         first = next((k for k, one in enumerate(own) if one.tag == "body"), len(own))
         own.insert(first, ET.Element("site", name=name, pos=numbers(place)))
     return xml_text(root, declared=False)

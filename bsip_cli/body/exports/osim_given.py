@@ -204,7 +204,10 @@ def _joint(element: ET.Element) -> GivenJoint:
     for side in ("parent", "child"):
         socket = _last(element.findtext(f"socket_{side}_frame"))
         if socket in frames:
-            ends.append((_last(frames[socket].findtext("socket_parent")), _offset(frames[socket])))
+            frame = frames[socket]  # turned about X, then the new Y, then the new Z
+            turns = Rotation.from_euler("XYZ", _three(frame.findtext("orientation", "0 0 0")))
+            offset = pin.SE3(turns.as_matrix(), _three(frame.findtext("translation", "0 0 0")))
+            ends.append((_last(frame.findtext("socket_parent")), offset))
         else:
             ends.append((socket, pin.SE3.Identity()))
     (parent, in_parent), (child, in_child) = ends
@@ -216,12 +219,6 @@ def _last(path: str | None) -> str:
     if path is None:
         raise ValueError("a joint without frames")
     return path.strip().rpartition("/")[2]
-
-
-def _offset(frame: ET.Element) -> pin.SE3:
-    """Of an offset frame: turned about X, then the new Y, then the new Z."""
-    turns = Rotation.from_euler("XYZ", _three(frame.findtext("orientation", "0 0 0")))
-    return pin.SE3(turns.as_matrix(), _three(frame.findtext("translation", "0 0 0")))
 
 
 def _three(text: str) -> np.ndarray:

@@ -46,9 +46,6 @@ class OnSkin(Effect):
     def moved(self, times_s: np.ndarray) -> np.ndarray:
         """(F,) part of the way that it has gone, 0 to 1."""
 
-    def place(self) -> str:
-        return self.marker
-
 
 @dataclass(frozen=True, eq=False)
 class MarkerShift(OnSkin, name="marker_shift"):
@@ -204,9 +201,6 @@ class JointCentre(Effect, name="joint_centre"):
             markers[label] = replace(marker, position_m=marker.position_m - self.shift_m)
         return replace(person, markers=markers)
 
-    def place(self) -> str:
-        return self.joint
-
 
 class MissingJoint(Effect, name="missing_joint"):
     """The spine bends at T12/L1 through `size` rad, and the waist by as much less.
@@ -222,9 +216,6 @@ class MissingJoint(Effect, name="missing_joint"):
         angles = {**plan.angles_rad, "waist": (1.0 - part) * waist, "spine": part * waist}
         notes = {**plan.notes, "missing_joint_range_rad": part * flexion_range}
         return replace(plan, angles_rad=angles, notes=notes)
-
-    def place(self) -> str:
-        return "spine"
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,6 +243,3 @@ class SegmentInertia(Effect, name="segment_inertia"):
             com = part.com_m * np.array([1.0, along, 1.0])
             inertias[body] = Inertia(scale * part.mass_kg, com, scale * part.tensor_kgm2)
         return replace(person, inertias=inertias)
-
-    def place(self) -> str:
-        return self.segment

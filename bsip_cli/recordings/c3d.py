@@ -18,9 +18,8 @@ from bsip_cli.recordings.c3d_format import Group, number, numbers, texts, whole_
 from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding, Recording, refusal
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
-from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import AS_STATED, Opened
+from bsip_cli.recordings.plate_wrench import lost_baseline
 from bsip_cli.recordings.plates import (
     CHANNELS_OF,
     PlateDescription,
@@ -28,8 +27,8 @@ from bsip_cli.recordings.plates import (
     measured,
     side_lengths,
 )
+from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
-from bsip_cli.recordings.zero import lost_baseline
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(

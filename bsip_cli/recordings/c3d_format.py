@@ -16,7 +16,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.model import Finding, refusal
-from bsip_cli.recordings.timebase import MOST_HZ
+from bsip_cli.recordings.text_tables import MOST_HZ
 
 BLOCK = 512
 C3D_KEY = 0x50

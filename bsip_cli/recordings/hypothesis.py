@@ -16,8 +16,6 @@ from bsip_cli.recordings.body_motion import (
     GateLimits,
     turn_of_forces,
 )
-from bsip_cli.recordings.clock import pace, paces
-from bsip_cli.recordings.plate_of_table import ForceOnPoint
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     EXCHANGED,
@@ -25,10 +23,11 @@ from bsip_cli.recordings.plate_reading import (
     REVERSED,
     FrameChange,
     PlateReading,
+    PlateSource,
 )
-from bsip_cli.recordings.plate_source import PlateSource
 from bsip_cli.recordings.plates import cop_at_height
-from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.plates_of_files import ForceOnPoint
+from bsip_cli.recordings.trial_samples import TrialSamples, pace, paces
 from bsip_cli.recordings.under_the_feet import (
     Evidence,
     Feet,

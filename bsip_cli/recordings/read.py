@@ -17,16 +17,14 @@ from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads, r
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
-from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
-from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
+from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
+from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import FORCE_UNITS_N, Written
-from bsip_cli.recordings.zero import steady_pull, without_zeros
 from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0

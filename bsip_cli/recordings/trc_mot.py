@@ -14,11 +14,10 @@ from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
-from bsip_cli.recordings.plate_of_table import ForceOnPoint, points_that_move
-from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import Opened, PlateReading
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.timebase import (
+from bsip_cli.recordings.plates_of_files import ForceOnPoint, points_that_move
+from bsip_cli.recordings.text_tables import (
     FRAMES,
     MOST_HZ,
     UNITS_S,

@@ -376,15 +376,11 @@ def onto_grid(grid: Grid, values: np.ndarray, time_s: np.ndarray | None = None) 
         is_all = np.array_equal(nearest, np.arange(len(values)))
         return values if is_all else values[nearest]
     flat = values.reshape(len(values), -1)
-    columns = [_interpolated(time_s, stamps_s, column) for column in flat.T]
-    result = np.column_stack(columns)
+    lines = [np.interp(time_s, stamps_s, column, np.nan, np.nan) for column in flat.T]
+    result = np.column_stack(lines)
     exact = off <= _EXACT
     result[exact] = flat[nearest[exact]]
     return result.reshape(len(time_s), *values.shape[1:])
-
-
-def _interpolated(time_s: np.ndarray, stamps_s: np.ndarray, column: np.ndarray) -> np.ndarray:
-    return np.interp(time_s, stamps_s, column, left=np.nan, right=np.nan)
 
 
 def _printed_rate(

@@ -315,9 +315,10 @@ def _joint(element: ET.Element) -> GivenJoint:
         socket = _last(element.findtext(f"socket_{side}_frame"))
         if socket in frames:
             frame = frames[socket]  # turned about X, then the new Y, then the new Z
+            body = _last(frame.findtext("socket_parent"))
             turns = Rotation.from_euler("XYZ", _three(frame.findtext("orientation", "0 0 0")))
             offset = pin.SE3(turns.as_matrix(), _three(frame.findtext("translation", "0 0 0")))
-            ends.append((_last(frame.findtext("socket_parent")), offset))
+            ends.append((body, offset))
         else:
             ends.append((socket, pin.SE3.Identity()))
     (parent, in_parent), (child, in_child) = ends

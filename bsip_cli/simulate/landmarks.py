@@ -192,7 +192,8 @@ def _places(build: Build, found: dict[str, np.ndarray], girdle: str = "no") -> P
             place[2] *= sign
             for along, joint in _TERM.findall(row["along_hinge_m"]):
                 place = place + float(along) * sign * build.hinges[f"{joint}_{side}"]
-            places[label] = row["body"].replace("*", side), found.get(label, place)
+            place = place if row["x_m"] else found[label]
+            places[label] = row["body"].replace("*", side), place
     return places
 
 

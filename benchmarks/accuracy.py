@@ -95,7 +95,7 @@ def squats(person: Person, rng: np.random.Generator) -> Trial:
 def one_arm(person: Person, rng: np.random.Generator) -> Trial:
     """Standing, and the right arm swings a little."""
     plan = one_arm_plan(person, rng)
-    return trial_of(person, ONE_ARM, plan, balanced(person, plan, THIN))
+    return trial_of(person, plan, balanced(person, plan, THIN))
 
 
 def one_arm_plan(person: Person, rng: np.random.Generator) -> Plan:

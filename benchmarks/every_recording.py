@@ -23,8 +23,8 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.mot import read_mot
+from bsip_cli.recordings.plate_wrench import sample_at_frames, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.resample import sample_at_frames, wrench_at_marker_rate
 from tests.real.figaroh_csv import convert
 
 FILE = RESULTS / "real_every_recording.csv"

@@ -97,7 +97,7 @@ def _seat(person: Person, rng: np.random.Generator) -> Case:
     start = -2.0 if rng.uniform() < 0.4 else float(rng.uniform(0.8, 1.2))
     end = duration + 2.0 if rng.uniform() < 0.5 else duration - float(rng.uniform(0.7, 1.0))
     plan = sitting(person, rng, duration, start, end)
-    return Case(trial_of(person, "sitting", plan, balanced(person, plan, THIN)))
+    return Case(trial_of(person, plan, balanced(person, plan, THIN)))
 
 
 def sitting(

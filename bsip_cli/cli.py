@@ -133,7 +133,7 @@ def simulate(study, preset, **options):
     With --effect, something is hidden in the recordings that a simulation would get wrong; the
     folder truth/ says what.
     """
-    from bsip_cli.simulate.command import simulate_command
+    from bsip_cli.simulate.study import simulate_command
 
     simulate_command(study, preset, **options)
 
@@ -147,7 +147,7 @@ def inject(source, out, participants, seed, **effects):
 
     IN is a study folder, a C3D file, or a TRC file with its MOT file next to it; OUT is the copy.
     """
-    from bsip_cli.simulate.command import inject_command
+    from bsip_cli.simulate.study import inject_command
 
     return inject_command(source, out, participants, seed, **effects)
 

@@ -32,9 +32,9 @@ from bsip_cli.config import Config, config_of
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import Opened
 from bsip_cli.recordings.plates import PlateDescription
+from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_erosion
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from, remove, write_bytes
-from bsip_cli.body.exports import FORMATS, bids_motion, osim_given
+from bsip_cli.body.exports import FORMATS, bids_motion, osim
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
 from bsip_cli.body.inertia import from_readable
@@ -26,7 +26,7 @@ from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.analog import runs
-from bsip_cli.recordings.own_plates import SIDES
+from bsip_cli.recordings.contacts import SIDES
 from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
@@ -245,7 +245,7 @@ def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
     model, body_map = _given_model(request.model_file, request.model_bodies, skeleton)
 
     def given(body: IdentifiedPerson) -> tuple[str, str]:
-        result = osim_given.with_inertias(model, body_map, body)
+        result = osim.with_inertias(model, body_map, body)
         return result.text, f"{model.file}, map {body_map.name}: {result.sentence}"
 
     return {**writers, FORMATS["osim"][0]: given}
@@ -253,7 +253,7 @@ def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
 
 def _given_model(
     file: Path, name: str | None, skeleton: Skeleton
-) -> tuple[osim_given.GivenModel, osim_given.BodyMap]:
+) -> tuple[osim.GivenModel, osim.BodyMap]:
     check_regular(file, UsageError)
     try:
         content = file.read_bytes()
@@ -261,18 +261,18 @@ def _given_model(
         raise UsageError(
             f"cannot be read ({error.strerror})", file=file, remedy="check --model-file"
         ) from None
-    model = osim_given.read_given_model(content, file.name)
-    body_map = osim_given.load_body_map(name) if name else osim_given.fitting_map(model.masses_kg)
+    model = osim.read_given_model(content, file.name)
+    body_map = osim.load_body_map(name) if name else osim.fitting_map(model.masses_kg)
     if body_map is None:
         raise UsageError(
-            f"its bodies fit no shipped map ({', '.join(osim_given.shipped_names())})",
+            f"its bodies fit no shipped map ({', '.join(osim.shipped_names())})",
             file=file,
             expected=f"bodies as in one of them; it has {', '.join(model.masses_kg) or 'none'}",
             remedy="write a map like configs/opensim/rajagopal.toml and give it with "
             "--model-bodies",
         )
-    osim_given.check_segments(body_map, skeleton)
-    osim_given.check_fits(model, body_map)
+    osim.check_segments(body_map, skeleton)
+    osim.check_fits(model, body_map)
     return model, body_map
 
 

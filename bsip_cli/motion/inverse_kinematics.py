@@ -296,7 +296,7 @@ class PoseResponse:
     ) -> np.ndarray:
         """(N, m, 3, k) change of every marker's residual: its error less what the pose follows.
 
-        In the axes of the markers' segments, as :func:`motion.jacobian.marker_residuals`.
+        In the axes of the markers' segments, as :func:`marker_residuals`.
         ``moved`` (N, nv, k) is the pose's answer where it is not :meth:`of` the errors.
         """
         chosen = range(len(self.person.markers)) if markers is None else markers

@@ -98,7 +98,13 @@ def exchanged_back(
     again : the fit with all suspected labels exchanged (:func:`refitted`).
     """
     fit, kept = labelling.fit, list(suspected)
-    while nearer := [one for one in kept if _comes_nearer(one, fit, again)]:
+    limit = 3**0.5 * float(fit.trusted_m.min())  # trusted in each of three directions
+
+    def comes_nearer(one: Exchange) -> bool:
+        pairs = [[x.distance_m(m)[one.frames] for x in (again, fit)] for m in (one.a, one.b)]
+        return all(misfit_m(now) < max(misfit_m(was), limit) for now, was in pairs)
+
+    while nearer := list(filter(comes_nearer, kept)):
         if len(nearer) == len(kept):
             break
         kept, again = nearer, refitted(fit, refit, nearer)
@@ -134,14 +140,6 @@ def _order(fit: MarkerFit, exchanges: Sequence[Exchange]) -> np.ndarray:
     for one in exchanges:
         order[one.frames, [one.a, one.b]] = order[one.frames, [one.b, one.a]]
     return order
-
-
-def _comes_nearer(one: Exchange, before: MarkerFit, after: MarkerFit) -> bool:
-    was, now = (
-        [misfit_m(fit.distance_m(m)[one.frames]) for m in (one.a, one.b)] for fit in (before, after)
-    )
-    limit = 3**0.5 * float(before.trusted_m.min())  # trusted in each of three directions
-    return all(near < max(far, limit) for near, far in zip(now, was, strict=True))
 
 
 # --- the markers of a segment in another order, throughout ----------------------------------------

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -88,7 +89,8 @@ class Body:
         if mass < _MOST_OF_IT or n_frames < _FEWEST_FRAMES:
             nothing = np.full((len(frames), 6), np.nan)
             return cls(nothing[:, :3], nothing, nothing, nothing[:, 0], np.zeros(len(frames), int))
-        paths = _about_centres({name: _smooth(paths[name], rate_hz) for name in weights})
+        smooth = partial(gaussian_filter1d, sigma=SMOOTH_S * rate_hz, axis=0, mode="nearest")
+        paths = _about_centres({name: smooth(paths[name]) for name in weights})
         place = np.asarray(sum(w / mass * paths[n].mean(axis=1) for n, w in weights.items()))
         velocity = np.gradient(place, axis=0) * rate_hz
         spin, noise = np.zeros_like(place), np.zeros(6)
@@ -104,7 +106,8 @@ class Body:
         edge[round(_EDGE_S * rate_hz) : n_frames - round(_EDGE_S * rate_hz)] = False
         rate[edge] = np.nan
         lasts = np.diff(frames, append=frames[-1:] + 1) / rate_hz
-        noise *= _acceleration_of_noise(rate_hz)
+        # Of smoothed white noise: the integral of w^4 exp(-w^2 s^2) over its spectrum.
+        noise *= 3.0 / (8.0 * np.sqrt(np.pi) * rate_hz * SMOOTH_S**5)
         lasts = np.minimum(lasts, INDEPENDENT_S)
         each = np.tile(noise, (len(frames), 1))
         return cls(place[frames], rate[frames], each, lasts, np.zeros(len(frames), int))
@@ -316,12 +319,6 @@ def turn_of_forces(
     return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total)))
 
 
-def _acceleration_of_noise(rate_hz: float) -> float:
-    """Variance of the second derivative of smoothed white noise of variance 1 [1/s4]: the integral
-    of w^4 exp(-w^2 s^2) over its spectrum."""
-    return float(3.0 / (8.0 * np.sqrt(np.pi) * rate_hz * SMOOTH_S**5))
-
-
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Of (n, 3) each: ten times as fast as numpy's on small arrays."""
     return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
@@ -349,7 +346,3 @@ def _about_centres(paths: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         part = _TO_NEIGHBOUR.get(kind, 0.0) * (home != name)
         found[name] = (1 - part) * path + part * paths[home].mean(axis=1, keepdims=True)
     return found
-
-
-def _smooth(paths: np.ndarray, rate_hz: float) -> np.ndarray:
-    return np.asarray(gaussian_filter1d(paths, SMOOTH_S * rate_hz, axis=0, mode="nearest"))

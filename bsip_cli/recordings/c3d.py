@@ -18,9 +18,8 @@ from bsip_cli.recordings.c3d_format import Group, number, numbers, texts, whole_
 from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding, Recording, refusal
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
-from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import AS_STATED, Opened
+from bsip_cli.recordings.plate_wrench import lost_baseline
 from bsip_cli.recordings.plates import (
     CHANNELS_OF,
     PlateDescription,
@@ -28,8 +27,8 @@ from bsip_cli.recordings.plates import (
     measured,
     side_lengths,
 )
+from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
-from bsip_cli.recordings.zero import lost_baseline
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
@@ -305,7 +304,13 @@ def _plate_unit(
     if corners_are_plausible(written * length_unit_m):
         return length_unit_m, []
     sizes = {unit: size for unit in _PLATE_UNITS if (size := length_in_m(unit)) is not None}
-    fitting = {unit: size for unit, size in sizes.items() if _is_usual_plate(written * size)}
+    low, high = _USUAL_SIDES_M
+    fitting = {
+        unit: size
+        for unit, size in sizes.items()
+        if low <= (sides := side_lengths(written * size)).min() and sides.max() <= high
+        if corners_are_plausible(written * size)
+    }
     found, expected = _sides(written * length_unit_m), "a rectangle of 0.1 to 5 m"
     if len(fitting) != 1:
         raise _UnusablePlateError(f"corners that are no plate: {found}", expected)
@@ -331,11 +336,6 @@ def _without_place(stated: PlateDescription) -> tuple[PlateDescription, list[Fin
     action = "took the moments about the middle of its surface"
     about = Finding("plate_origin", stated.name, found, expected, action, "corrected")
     return replace(stated, origin_m=np.zeros(3)), [about]
-
-
-def _is_usual_plate(corners_m: np.ndarray) -> bool:
-    (low, high), sides = _USUAL_SIDES_M, side_lengths(corners_m)
-    return corners_are_plausible(corners_m) and bool(low <= sides.min() and sides.max() <= high)
 
 
 def _sides(corners_m: np.ndarray) -> str:

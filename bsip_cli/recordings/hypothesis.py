@@ -16,8 +16,6 @@ from bsip_cli.recordings.body_motion import (
     GateLimits,
     turn_of_forces,
 )
-from bsip_cli.recordings.clock import pace, paces
-from bsip_cli.recordings.plate_of_table import ForceOnPoint
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     EXCHANGED,
@@ -25,10 +23,11 @@ from bsip_cli.recordings.plate_reading import (
     REVERSED,
     FrameChange,
     PlateReading,
+    PlateSource,
 )
-from bsip_cli.recordings.plate_source import PlateSource
 from bsip_cli.recordings.plates import cop_at_height
-from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.plates_of_files import ForceOnPoint
+from bsip_cli.recordings.trial_samples import TrialSamples, pace, paces
 from bsip_cli.recordings.under_the_feet import (
     Evidence,
     Feet,
@@ -298,24 +297,21 @@ class Hypothesis:
             for repair, fit in zip(repairs, fits, strict=True):
                 possible.setdefault(repair, {})[name] = fit
         for repair, every in possible.items():
-            some = {name: fit for name, fit in every.items() if self._is_other(name, fit)}
+            some = {n: fit for n, fit in every.items() if fit.reading != self.fits[n].reading}
             if repair != AS_STATED and some:
                 yield self._with(some)
                 yield from (self._with({name: fit}) for name, fit in some.items() if len(some) > 1)
         for pair in combinations(self.fits, 2):
             if all(name in trial.sources for trial in self.trials for name in pair):
-                yield self._with({a: self._in_place_of(a, b) for a, b in (pair, pair[::-1])})
-
-    def _is_other(self, name: str, fit: PlateFit) -> bool:
-        return fit.reading != self.fits[name].reading
+                exchanged = {}
+                for name, other in (pair, pair[::-1]):
+                    place = self.fits[other].reading.place_of or other
+                    reading = replace(self.fits[name].reading, place_of=place * (place != name))
+                    (exchanged[name],) = plate_fits(self.trials, name, [reading])
+                yield self._with(exchanged)
 
     def _with(self, fits: Mapping[str, PlateFit]) -> Hypothesis:
         return Hypothesis(self.frame, self.trials, self.body, {**self.fits, **fits}, self.limits)
-
-    def _in_place_of(self, name: str, other: str) -> PlateFit:
-        place = self.fits[other].reading.place_of or other
-        reading = replace(self.fits[name].reading, place_of=place * (place != name))
-        return plate_fits(self.trials, name, [reading])[0]
 
 
 def _with(repair: PlateReading, now: PlateReading) -> PlateReading:

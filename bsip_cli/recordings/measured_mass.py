@@ -327,12 +327,6 @@ class Comparison:
             return f"{self.stated_kg:g} is likely to be {turned:g} with two digits exchanged"
         return ""
 
-    def _likely_forces(self) -> str:
-        for name, newton in FORCE_UNITS_N.items():
-            if self._meets(self.stated_kg / newton):
-                return _IN_UNIT.format(name)
-        return ""
-
     def _meets(self, mass_kg: float) -> bool:
         allowed = self.tolerance_percent + self.measured.half_width_percent
         return abs(_PERCENT * ((mass_kg + self.load_kg) / self.measured.mass_kg - 1.0)) <= allowed
@@ -341,9 +335,10 @@ class Comparison:
         """Of a difference: both numbers; what is likely, where it is gross."""
         remark = f" ({self.difference_percent:+.1f} %)"
         if self.is_gross:
+            stated = {name: self.stated_kg / size for name, size in FORCE_UNITS_N.items()}
+            units = (_IN_UNIT.format(name) for name, kg in stated.items() if self._meets(kg))
             nothing_known = "a typing mistake, another person's row, a second person or a load on "
-            likely = self.likely() or self._likely_forces() or f"{nothing_known}the plates"
-            remark = f"; {likely}"
+            remark = f"; {self.likely() or next(units, f'{nothing_known}the plates')}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
             f"the plates measure {self.measured.words()}{remark}"

@@ -19,6 +19,7 @@ from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,
     LastDigit,
+    Stamps,
     agreeing,
     check_names,
     dialect_of,
@@ -31,7 +32,6 @@ from bsip_cli.recordings.text_tables import (
     text_lines,
     without_end,
 )
-from bsip_cli.recordings.timebase import Stamps
 from bsip_cli.recordings.units import force_in_N
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)

@@ -17,16 +17,14 @@ from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads, r
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
-from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
-from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
+from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
+from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import FORCE_UNITS_N, Written
-from bsip_cli.recordings.zero import steady_pull, without_zeros
 from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
@@ -92,7 +90,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     recording = opened.recording
     delay_s = session.delays_s.get(recording.path.stem, 0.0)
     opened = opened.with_forces_from(delay_s)
-    delayed = _about_delay(delay_s) if delay_s else _delayed_elsewhere(session.delays_s)
+    delayed = _about_delay(delay_s, session.delays_s)
     findings = [*findings_about(session), *delayed, *_about_sides(recording)]
     paces = (one.get(recording.path.stem, 1.0) for one in (session.paces, session.maybe_paces))
     surely, maybe = (_other_pace(times, recording.marker_rate_hz) for times in paces)
@@ -250,23 +248,17 @@ def _other_trial(name: str) -> str:
     return words if name else ""
 
 
-def _delayed_elsewhere(delays_s: Mapping[str, float]) -> list[Finding]:
-    """What a quiet trial does not show of itself."""
-    if not delays_s:
-        return []
-    name, delay_s = next(iter(delays_s.items()))
-    found, expected = f"in {name} {delay_words(delay_s)}", "one clock of markers and forces"
-    action = (
-        "none shows here, took the times as they stand; look whether the same delay is here too"
-    )
-    return [Finding("delay", "forces", found, expected, action, "warning")]
-
-
-def _about_delay(delay_s: float) -> list[Finding]:
-    found = delay_words(delay_s)
-    action = "moved them by that; start markers and forces by one signal to know it better"
-    expected = "one clock of markers and forces"
-    return [Finding("delay", "forces", found, expected, action, "corrected")]
+def _about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
+    """Of the trial, or of another one: a quiet trial does not show it of itself."""
+    expected, level = "one clock of markers and forces", "corrected"
+    if own_s:
+        found = delay_words(own_s)
+        action = "moved them by that; start markers and forces by one signal to know it better"
+        return [Finding("delay", "forces", found, expected, action, level)]
+    action = "none shows here, took the times as they stand; look whether the same delay is here "
+    action, level = f"{action}too", "warning"
+    said = [f"in {name} {delay_words(delay_s)}" for name, delay_s in delays_s.items()]
+    return [Finding("delay", "forces", found, expected, action, level) for found in said[:1]]
 
 
 def _about_plate(name: str, verdict: Verdict) -> list[Finding]:

@@ -17,12 +17,16 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import log_odds_of, surest
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis, PlateFit
-from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
-from bsip_cli.recordings.plate_source import repeated_plates
+from bsip_cli.recordings.plate_reading import (
+    FORCES_MOVED,
+    MIRRORS,
+    FrameChange,
+    PlateReading,
+    repeated_plates,
+)
 from bsip_cli.recordings.scene import Handedness, Stature
-from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, surest
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
 from bsip_cli.recordings.written import (
     AS_WRITTEN,

@@ -18,6 +18,7 @@ from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,
     LastDigit,
+    Stamps,
     check_names,
     dialect_of,
     head_of,
@@ -29,7 +30,6 @@ from bsip_cli.recordings.text_tables import (
     text_lines,
     without_end,
 )
-from bsip_cli.recordings.timebase import Stamps
 
 _HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
 _SOON = 100_000  # rows, a quarter of an hour at 100 Hz: the last marker is seen in one of them

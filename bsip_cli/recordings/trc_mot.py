@@ -14,11 +14,10 @@ from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
-from bsip_cli.recordings.plate_of_table import ForceOnPoint, points_that_move
-from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import Opened, PlateReading
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.timebase import (
+from bsip_cli.recordings.plates_of_files import ForceOnPoint, points_that_move
+from bsip_cli.recordings.text_tables import (
     FRAMES,
     MOST_HZ,
     UNITS_S,
@@ -35,9 +34,8 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
 from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
-_VALUES_PER_BYTE = (
-    5  # of both files: a grid of forces may need as much memory as c3d_content allows
-)
+# Of both files: a grid of forces may need as much memory as c3d_content allows.
+_VALUES_PER_BYTE = 5
 _MM = 1e-3
 _UNEVEN = "the times of the .mot do not increase evenly"
 _WHAT = "times of the forces"

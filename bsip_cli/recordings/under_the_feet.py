@@ -58,10 +58,10 @@ class Feet:
     ) -> Feet:
         """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
         height = markers_m[..., 2] - floor_m
-        lowest = _lowest(height)
-        feet = np.flatnonzero(lowest < _LOW_M)
+        standing = lowest(height)
+        feet = np.flatnonzero(standing < _LOW_M)
         points = markers_m[np.ix_(frames, feet)][..., :2].copy()
-        points[height[np.ix_(frames, feet)] - lowest[feet] > _LIFT_M] = np.nan
+        points[height[np.ix_(frames, feet)] - standing[feet] > _LIFT_M] = np.nan
         return cls(points, tuple(sides[k] for k in feet.tolist()))
 
     def on(self, corners_m: np.ndarray | None) -> Feet:
@@ -236,7 +236,7 @@ def _astray(
     return np.abs(beyond) / (np.abs(slope) ** 2 + (_PLACE_M / height) ** 2).sum(axis=1)
 
 
-def _lowest(height_m: np.ndarray) -> np.ndarray:
+def lowest(height_m: np.ndarray) -> np.ndarray:
     """2nd percentile of each marker's heights (n_frames, n_markers), infinite if never seen."""
     seen = np.isfinite(height_m)
     columns = zip(height_m.T, seen.T, strict=True)

@@ -136,13 +136,8 @@ def force_unit(
         name: _OTHER_UNIT - np.log(len(FORCE_UNITS_N)) + log_likelihood(size * mass_kg)
         for name, size in FORCE_UNITS_N.items()
     } | {"N": log_likelihood(mass_kg), "": logsumexp(partly) - np.log(_SHARES)}
-    if is_over_weight(mass_kg, gross_percent):  # parts of it, which are in no unit
+    if percent_apart(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent:  # parts of the weight
         logs["weight"] = _OTHER_UNIT + norm.logpdf(0.0, scale=_BMI_SD)
     best = max(logs, key=lambda name: logs[name])
     is_sure = logs[best] - logsumexp(list(logs.values())) >= np.log(surely)
     return best if is_sure and best in FORCE_UNITS_N else ""
-
-
-def is_over_weight(mass_kg: float, gross_percent: float) -> bool:
-    """Whether forces are parts of the weight."""
-    return percent_apart(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent

@@ -87,8 +87,7 @@ def poses_of(
         origin[body] = poses.point(parent, place_m)
         rotation[body] = rotation[parent] @ turns[body]
 
-    origin["abdomen"] = pelvis_m
-    rotation["abdomen"] = pelvis_rotation @ turns["abdomen"]
+    hang("abdomen", "lower_torso", np.zeros(3))
     thorax = rotation["abdomen"] @ turns["thorax"] if "thorax" in turns else rotation["abdomen"]
     origin["thorax"] = poses.point("abdomen", joints["tjc"]) + rotate(thorax, joints["cjc"])
     rotation["thorax"] = thorax

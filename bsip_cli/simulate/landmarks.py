@@ -14,7 +14,11 @@ swings as one mass, its damping, and the trunk's frequency.
 
 from __future__ import annotations
 
+import csv
+import re
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 
@@ -51,6 +55,7 @@ SWINGING = {  # share of the segment's mass, and the range of its frequency [Hz]
 }
 DAMPING_RATIO = (0.2, 0.4)
 MARKER_SHARE = (0.3, 1.0)  # of the tissue's swing that a marker over it shows
+_TERM = re.compile(r"(-?[\d.]+)(?: ([a-z_]+))?")
 Places = dict[str, tuple[str, np.ndarray]]
 """By label, the bone under a marker and the place (3,) in that bone's frame."""
 
@@ -120,10 +125,7 @@ def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
 
 def place_markers(rng: np.random.Generator, build: Build, richness: Richness) -> dict[str, Marker]:
     """The 38 markers of a person."""
-    places = {**_head_and_trunk(build), **_pelvis(build)}
-    for side, sign in (("l", -1.0), ("r", 1.0)):
-        places |= {**_arm(build, side, sign), **_leg(build, side, sign)}
-    return _skin_markers(places, rng, richness)
+    return _skin_markers(_places(build, _regressed(build)), rng, richness)
 
 
 def with_girdle(
@@ -134,8 +136,7 @@ def with_girdle(
     The clavicles have no mass of their own: the thorax keeps that of the girdle, as every model
     with massless clavicles has it.
     """
-    joints, markers = dict(build.joints_m), dict(markers)
-    places: Places = {"OCC": ("head", np.array([-0.09, 0.7 * build.lengths_m["head"], 0.0]))}
+    joints, markers, found = dict(build.joints_m), dict(markers), {}
     for side, sign in (("l", -1.0), ("r", 1.0)):
         offset = richness.joint_centre_offset * JOINT_OFFSET_M * rng.standard_normal(3)
         from_notch = build.widths_m["thorax"] * JOINT_FROM_NOTCH * np.array([1.0, 1.0, sign])
@@ -144,8 +145,9 @@ def with_girdle(
         label = f"{side.upper()}AC"
         acromion = markers[label].position_m - joint
         markers[label] = replace(markers[label], body=f"clavicle_{side}", position_m=acromion)
-        places |= _girdle_and_clusters(build, side, sign, acromion)
-    return joints, markers | _skin_markers(places, rng, richness)
+        found[f"{side.upper()}CLA"] = 0.5 * acromion + np.array([0.015, 0.008, 0.0])
+        found[f"{side.upper()}AA"] = acromion + np.array([-0.035, -0.005, -0.01 * sign])
+    return joints, markers | _skin_markers(_places(build, found, "yes"), rng, richness)
 
 
 def _skin_markers(
@@ -174,90 +176,52 @@ def _skin_markers(
     return markers
 
 
+def _places(build: Build, found: dict[str, np.ndarray], girdle: str = "no") -> Places:
+    """Places by the table, in its order, those of the left side before those of the right one; of
+    rows without numbers as they were found."""
+    places = {}
+    for side, sign in (("", 1.0), ("l", -1.0), ("r", 1.0)):
+        own = {name.removesuffix(f"_{side}"): size for name, size in build.lengths_m.items()}
+        sizes = own | {"ankle_height": build.ankle_height_m, "": 1.0}
+        for row in _rows():
+            if row["girdle"] != girdle or ("*" in row["label"]) != bool(side):
+                continue
+            label, place = row["label"].replace("*", side.upper()), np.zeros(3)
+            for axis, name in enumerate(("x_m", "y_m", "z_m")):
+                place[axis] = sum(float(k) * sizes[size] for k, size in _TERM.findall(row[name]))
+            place[2] *= sign
+            for along, joint in _TERM.findall(row["along_hinge_m"]):
+                place = place + float(along) * sign * build.hinges[f"{joint}_{side}"]
+            place = place if row["x_m"] else found[label]
+            places[label] = row["body"].replace("*", side), place
+    return places
+
+
+@cache
+def _rows() -> list[dict[str, str]]:
+    """A coordinate is a sum of terms, metres or parts of a size; Z points outwards on each side."""
+    table = files("bsip_cli.simulate").joinpath("markers.csv").read_text(encoding="utf-8")
+    return list(csv.DictReader(table.splitlines()))
+
+
 def _in_plane(degrees: float) -> np.ndarray:
     """(3,) unit vector ahead, raised by an angle."""
     return np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees)), 0.0])
 
 
-def _head_and_trunk(build: Build) -> Places:
-    """Landmarks of the head, and of the thorax in the thorax frame (origin CJC)."""
-    h, size = build.lengths_m["head"], build.lengths_m["upper_torso"]
-    width = build.widths_m["thorax"]
-    share, angle = CERVICAL_SHARE[build.sex]
+def _regressed(build: Build) -> dict[str, np.ndarray]:
+    """Landmarks from which the regressions predict the joint centres wrongly by the drawn errors:
+    of the thorax (origin CJC), the pelvis (origin at the true LJC) and the shoulders."""
+    width, (share, angle) = build.widths_m["thorax"], CERVICAL_SHARE[build.sex]
     c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
-    return {
-        "RTEM": ("head", np.array([0.03, 0.62 * h, 0.075])),
-        "LTEM": ("head", np.array([0.03, 0.62 * h, -0.075])),
-        "FHEAD": ("head", np.array([0.115, 0.75 * h, 0.0])),
-        "C7": ("thorax", c7),
-        "IJ": ("thorax", c7 + width * _in_plane(-STERNUM_SLOPE_DEG)),
-        "T10": ("thorax", np.array([-0.235 * size, -0.50 * size, 0.0])),
-        "XIPH": ("thorax", np.array([0.21 * size, -0.40 * size, 0.0])),
-        "RSCAP": ("thorax", np.array([-0.25 * size, -0.30 * size, 0.19 * size])),
-    }
-
-
-def _pelvis(build: Build) -> Places:
-    """Spines of the pelvis in the lower torso's frame (origin at the true LJC)."""
-    width, shift = build.widths_m["pelvis"], -build.errors_m["ljc"]
-    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * width
-    back, aside = x - 0.68 * width, 0.045
-    return {
-        "RASIS": ("lower_torso", np.array([x, y, z]) + shift),
-        "LASIS": ("lower_torso", np.array([x, y, -z]) + shift),
-        "RPSIS": ("lower_torso", np.array([back, y, aside]) + shift),
-        "LPSIS": ("lower_torso", np.array([back, y, -aside]) + shift),
-    }
-
-
-def _arm(build: Build, side: str, sign: float) -> Places:
-    """Arm landmarks; the styloids move with the hand (pronation is at the wrist)."""
-    S, lengths = side.upper(), build.lengths_m
-    upper, lower, hand = f"upper_arm_{side}", f"forearm_{side}", f"hand_{side}"
+    found = {"C7": c7, "IJ": c7 + width * _in_plane(-STERNUM_SLOPE_DEG)}
     share, angle = SHOULDER_FROM_ACROMION
-    shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
-    elbow = np.array([0.0, -lengths[upper], 0.0]) + 0.036 * sign * build.hinges[f"elbow_{side}"]
-    return {
-        f"{S}AC": ("thorax", shoulder - share * build.widths_m["thorax"] * _in_plane(angle)),
-        f"{S}UA": (upper, np.array([0.008, -0.5 * lengths[upper], sign * 0.047])),
-        f"{S}ELB": (upper, elbow),
-        f"{S}FA": (lower, np.array([-0.01, -0.45 * lengths[lower], sign * 0.038])),
-        f"{S}WRR": (hand, np.array([0.003, 0.0, sign * 0.029])),
-        f"{S}WRU": (hand, np.array([-0.003, 0.0, -sign * 0.029])),
-        f"{S}HAND": (hand, np.array([-0.016, -lengths[hand], sign * 0.003])),
-    }
-
-
-def _leg(build: Build, side: str, sign: float) -> Places:
-    """Leg landmarks; foot markers about the ankle joint, sole at -ankle_height."""
-    S, lengths, low = side.upper(), build.lengths_m, 0.036 - build.ankle_height_m
-    thigh, shank, foot = f"thigh_{side}", f"shank_{side}", f"foot_{side}"
-    knee, ankle = (np.array([0.0, -lengths[body], 0.0]) for body in (thigh, shank))
-    across = 0.050 * sign * build.hinges[f"knee_{side}"]
-    heel, front = heel_and_toe_m(lengths[foot])
-    return {
-        f"{S}KNEL": (thigh, knee + across),
-        f"{S}KNEM": (thigh, knee - across),
-        f"{S}MALL": (shank, ankle + np.array([-0.006, -0.006, sign * 0.037])),
-        f"{S}MALM": (shank, ankle + np.array([0.006, 0.006, -sign * 0.037])),
-        f"{S}CAL": (foot, np.array([heel, low, 0.0])),
-        f"{S}MT2": (foot, np.array([front, low, -sign * 0.008])),
-    }
-
-
-def _girdle_and_clusters(build: Build, side: str, sign: float, acromion: np.ndarray) -> Places:
-    """What a side has more of with a clavicle."""
-    S, lengths = side.upper(), build.lengths_m
-    clavicle, arm, thigh, shank, foot = (
-        f"{name}_{side}" for name in ("clavicle", "upper_arm", "thigh", "shank", "foot")
-    )
-    elbow = np.array([0.0, -lengths[arm], 0.0]) - 0.036 * sign * build.hinges[f"elbow_{side}"]
-    _, front = heel_and_toe_m(lengths[foot])
-    return {
-        f"{S}CLA": (clavicle, 0.5 * acromion + np.array([0.015, 0.008, 0.0])),
-        f"{S}AA": (clavicle, acromion + np.array([-0.035, -0.005, -0.01 * sign])),
-        f"{S}ELBM": (arm, elbow),
-        f"{S}THI": (thigh, np.array([0.02, -0.55 * lengths[thigh], sign * 0.075])),
-        f"{S}TIB": (shank, np.array([0.02, -0.5 * lengths[shank], sign * 0.05])),
-        f"{S}MT5": (foot, np.array([front - 0.02, 0.02 - build.ankle_height_m, sign * 0.04])),
-    }
+    across = build.widths_m["pelvis"]
+    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * across
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        spines = {"ASIS": [x, y, sign * z], "PSIS": [x - 0.68 * across, y, sign * 0.045]}
+        for name, place in spines.items():
+            found[side.upper() + name] = np.array(place) - build.errors_m["ljc"]
+        shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
+        found[f"{side.upper()}AC"] = shoulder - share * width * _in_plane(angle)
+    return found

@@ -337,26 +337,20 @@ def other_side(side: str) -> str:
 def moved_a_little(
     sketch: Sketch, rng: np.random.Generator, breath_deg: float, sway: float = 1.0
 ) -> None:
-    """Add a breath of motion and sway: nobody stands quite still."""
+    """Add a breath of motion, and a slow drift of the COP along the feet and, while both carry
+    load, between them: nobody stands quite still."""
     add_breath_of_motion(sketch, rng, np.deg2rad(breath_deg))
-    add_sway(sketch, rng, sway)
+    ahead, aside = (slow_drift(sketch.t_s, rng, sway * size, 0.15, 0.8) for size in SWAY_M)
+    aside = aside / (2.0 * sketch.half_stance_m())
+    aside *= 4.0 * sketch.feet["r"].share * sketch.feet["l"].share
+    for side, sign in SIDE_SIGN.items():
+        sketch.feet[side].cop_ahead_m += ahead
+        sketch.feet[side].share += sign * aside
 
 
 def plate_under(sketch: Sketch, rng: np.random.Generator) -> tuple[float, float]:
     """A plate centre near the middle of natural stance."""
     return (sketch.mid_foot_m() + rng.normal(0.0, 0.02), rng.normal(0.0, 0.03))
-
-
-def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float) -> None:
-    """Slow drift of the COP: along the feet, and between them while both carry load."""
-    ahead = slow_drift(sketch.t_s, rng, scale * SWAY_M[0], 0.15, 0.8)
-    aside = slow_drift(sketch.t_s, rng, scale * SWAY_M[1], 0.15, 0.8) / (
-        2.0 * sketch.half_stance_m()
-    )
-    aside *= 4.0 * sketch.feet["r"].share * sketch.feet["l"].share
-    for side, sign in SIDE_SIGN.items():
-        sketch.feet[side].cop_ahead_m += ahead
-        sketch.feet[side].share += sign * aside
 
 
 def add_breath_of_motion(sketch: Sketch, rng: np.random.Generator, size_rad: float) -> None:

@@ -49,7 +49,6 @@ class Trial:
     on_plate : (T,) by side: whether the foot's contact (if any) is on the first plate.
     """
 
-    task: str
     time_s: np.ndarray
     poses: Poses
     force_n: np.ndarray
@@ -108,10 +107,10 @@ def simulate_trial(
     for effect in effects:
         plan = effect.plan(person, plan)
     poses = balanced(person, plan, 1 if plan.flights else THIN)
-    return trial_of(person, task, plan, poses)
+    return trial_of(person, plan, poses)
 
 
-def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
+def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
     """Wrenches of a balanced movement, cut to what is recorded.
 
     Each foot has its share of the force, acting under that foot: its COP differs from its plan as
@@ -127,7 +126,6 @@ def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
         feet_force[side] = share * force
         feet_moment[side] = share * moment + np.cross(lever, feet_force[side])
     return Trial(
-        task=task,
         time_s=np.arange(keep.stop - keep.start) * STEP_S,
         poses=poses.part(keep),
         force_n=force,

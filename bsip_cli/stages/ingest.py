@@ -30,9 +30,8 @@ from bsip_cli.recordings.momentum_mass import (
     intervals_of,
     upright_frames,
 )
+from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.read import assemble, findings_about
-from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.zero import without_zeros
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
 from bsip_cli.stages.frames import WRENCH

@@ -29,7 +29,7 @@ from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import coordinate_information
-from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
+from bsip_cli.recordings.contacts import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words

@@ -19,8 +19,7 @@ from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.measured_mass import plate_gains
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import Interval
-from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import FrameChange, Opened, PlateReading
 from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files

@@ -12,7 +12,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.inverse_kinematics import marker_residuals
-from bsip_cli.recordings.resample import silent_frames
+from bsip_cli.recordings.plate_wrench import silent_frames
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, markers_from, ordered_markers
 from bsip_cli.study.study import Trial

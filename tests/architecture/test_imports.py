@@ -54,7 +54,7 @@ MAY_ALSO = {"recordings.c3d_content": {"subprocess"}}
 # Single modules of a part that may be imported, where the part as a whole may not.
 ONLY = {
     "simulate": {"body": {"body.markersets"}},
-    "cli": {"simulate": {"simulate.command"}},
+    "cli": {"simulate": {"simulate.study"}},
     "library": {"running": {"running.unit"}, "stages": {"stages.frames"}},
     "commands": {
         "stages": {

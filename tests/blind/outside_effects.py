@@ -18,7 +18,7 @@ from bsip_cli.cli import main
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects import EFFECTS
 from bsip_cli.simulate.effects.base import KINDS, TABLE, Effect, Target
-from bsip_cli.simulate.effects.plates import ChannelFault, OfEveryPlate
+from bsip_cli.simulate.effects.instruments import ChannelFault, OfEveryPlate
 from bsip_cli.simulate.numerics import from_rotation_vector
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Load, Plan, Poses

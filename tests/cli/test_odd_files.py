@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.body.exports.osim_given import load_body_map
+from bsip_cli.body.exports.osim import load_body_map
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import load_config

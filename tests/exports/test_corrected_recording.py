@@ -27,9 +27,8 @@ from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session
 from bsip_cli.running.unit import file_hash
-from bsip_cli.simulate.command import inject_study
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
-from bsip_cli.simulate.study import simulate_study
+from bsip_cli.simulate.study import inject_study, simulate_study
 from bsip_cli.stages.diagnose_trial import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
 from tests.small_study import small

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from bsip_cli.body.exports.identified import neutral_pose
-from bsip_cli.body.exports.osim_given import (
+from bsip_cli.body.exports.osim import (
     check_fits,
     check_segments,
     fitting_map,

@@ -12,8 +12,8 @@ import pandas as pd
 
 from bsip_cli.errors import BsipError
 from bsip_cli.pipeline import stages_named
+from bsip_cli.recordings.plate_wrench import wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.running.runner import perform
 from bsip_cli.running.session import open_study
 from bsip_cli.running.unit import Unit

@@ -8,10 +8,9 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
-from bsip_cli.recordings.plate_of_table import ForceOnPoint, points_that_move
-from bsip_cli.recordings.plate_source import Opened, PlateSource
+from bsip_cli.recordings.plate_reading import Opened, PlateSource
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint, points_that_move
 
 N, RATE_HZ = 400, 100.0
 LABELS = ["RASI", "LASI", "RPSI", "LPSI", "RHEE", "RTOE", "RANK", "LHEE", "LTOE", "LANK"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
 
-from bsip_cli.recordings import plate_source as copies
+from bsip_cli.recordings import plate_reading as copies
 from bsip_cli.recordings.analog import SampleCheck, check_samples, sample_findings
 
 RATE_HZ = 1000.0

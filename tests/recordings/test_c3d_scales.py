@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.c3d_layout import about_scales, scaling_of
+from bsip_cli.recordings.c3d_format import about_scales, scaling_of
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import (
     PlateSpec,

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.body_motion import USUAL
-from bsip_cli.recordings.clock import Delay, Lags, lags, surest
-from bsip_cli.recordings.plate_reading import FrameChange
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import FrameChange, Opened
 from bsip_cli.recordings.read import assemble, open_recording
 from bsip_cli.recordings.session_reading import session_reading
-from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.trial_samples import Delay, Lags, TrialSamples, lags, surest
 from tests.recordings.standing_on_two_plates import RATE_HZ, N, motion, of_c3d, of_table, opened
 
 MOVING = (  # walks, a jump, sitting down: each alone tells that its rate is twice the cameras'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.own_plates import Reading, foot_forces, plate_noise
+from bsip_cli.recordings.contacts import Reading, foot_forces, plate_noise
 
 COUNT, RATE_HZ = 200, 100.0
 LEFT, RIGHT = np.array([0.0, 0.1, 0.0]), np.array([0.0, -0.1, 0.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.zero import lost_baseline
+from bsip_cli.recordings.plate_wrench import lost_baseline
 
 N, ZERO = 400, slice(0, 50)
 

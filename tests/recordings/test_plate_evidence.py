@@ -9,11 +9,11 @@ import pytest
 
 from bsip_cli.recordings.analog import check_samples, spike_samples
 from bsip_cli.recordings.model import Plate, Recording
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
 from bsip_cli.recordings.plate_reading import AS_STATED
+from bsip_cli.recordings.plate_wrench import nobody_near, plate_zero
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
+from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.read import lost_zeros, read_recording, sign_doubts
-from bsip_cli.recordings.zero import nobody_near, plate_zero
 from tests.circumstances.sound import sound_session
 from tests.recordings import standing_on_two_plates as trials
 from tests.recordings.recording_writers import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bsip_cli.recordings.model import Plate
-from bsip_cli.recordings.zero import plate_zero, subtract_zero
+from bsip_cli.recordings.plate_wrench import plate_zero, subtract_zero
 
 RATE_HZ = 1000.0
 OFFSET = np.array([3.0, -2.0, 12.0, 0.5, -0.4, 0.1])

@@ -14,9 +14,8 @@ from bsip_cli.recordings.contacts import (
     plate_loads,
 )
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.resample import wrench_at_marker_rate
-from bsip_cli.recordings.zero import plate_zero
 
 pytestmark = pytest.mark.real
 

@@ -9,8 +9,8 @@ import pytest
 
 from bsip_cli.recordings.gaps import fill_gaps, repeated_frames, without_repeats
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.simulate.command import inject_recording
 from bsip_cli.simulate.effects.base import Target
+from bsip_cli.simulate.study import inject_recording
 from tests.blind.outside_effects import RepeatedFrames
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "sub-01"

@@ -11,10 +11,9 @@ import pytest
 from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.hypothesis import Hypothesis
-from bsip_cli.recordings.plate_of_c3d import C3dPlate
-from bsip_cli.recordings.plate_of_table import ForceOnPoint
 from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
+from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, session_reading

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.model import Plate, Recording
-from bsip_cli.recordings.resample import sample_at_frames, silent_frames, wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import sample_at_frames, silent_frames, wrench_at_marker_rate
 
 FRAMES = 200
 RATES = [(1000.0, 100.0), (2000.0, 120.0), (1000.0, 100.5), (100.0, 100.0), (240.0, 200.0)]

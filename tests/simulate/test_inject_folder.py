@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate import command as injection
-from bsip_cli.simulate.command import inject_command, simulate_command
+from bsip_cli.simulate import study as injection
+from bsip_cli.simulate.study import inject_command, simulate_command
 
 ASKED = {"effects": ["plate_zero"], "sizes": [12.0], "targets": [], "effect_tasks": []}
 RECORDINGS = (

@@ -10,7 +10,6 @@ from bsip_cli.body.exports.identified import IdentifiedPerson, numbers, xml_comm
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
-_MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the order of fullinertia
 _NOTES = (
     "SI units, Z up. Body frames: origin at the joint to the parent, axes of the segment (X",
     "anterior, Y up, Z right); at qpos0 the person stands upright, facing along X. Sites are the",
@@ -34,9 +33,7 @@ def mjcf_text(body: IdentifiedPerson) -> str:
         above = elements[parent] if parent >= 0 else world
         elements.append(_add_body(above, body, i))
     for name, segment, place in body.markers():
-        own = elements[
-            segment
-        ]  # sites go before the child bodies, which is how such files are read
+        own = elements[segment]  # sites go before the child bodies: such files are read so
         first = next((k for k, one in enumerate(own) if one.tag == "body"), len(own))
         own.insert(first, ET.Element("site", name=name, pos=numbers(place)))
     return xml_text(root, declared=False)
@@ -60,12 +57,7 @@ def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
     else:
         axis = numbers(person.hinge_axes()[i])
         ET.SubElement(element, "joint", name=name, type="hinge", axis=axis)
-    inertia = body.in_joint(i) if i in skeleton.bodies else _ROD
-    ET.SubElement(
-        element,
-        "inertial",
-        pos=numbers(inertia.com_m),
-        mass=numbers([inertia.mass_kg]),
-        fullinertia=numbers([inertia.tensor_kgm2[entry] for entry in _MOMENTS]),
-    )
+    values = (body.in_joint(i) if i in skeleton.bodies else _ROD).readable()
+    mass, centre, moments = map(numbers, np.split(values, [1, 4]))
+    ET.SubElement(element, "inertial", pos=centre, mass=mass, fullinertia=moments)
     return element

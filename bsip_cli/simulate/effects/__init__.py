@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.effects import loads, markers, plates  # noqa: F401
+from bsip_cli.simulate.effects import instruments, loads  # noqa: F401
 from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 

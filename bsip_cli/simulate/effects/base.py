@@ -53,6 +53,7 @@ class Effect:
     settings : keys that a target may set.
     spares_static : not in static trials, unless they are asked for.
     personal : drawn for each participant; else once for the lab.
+    at : segment, marker or joint that it sits at, of its parameters.
     injectable : whether it can be hidden in measured data. hint : for those that are not, why.
     needs : "plates" where it works on forces, and "surface" where on a plate's place.
     """
@@ -66,6 +67,7 @@ class Effect:
     targets: ClassVar[str]
     choices: ClassVar[list[str]]
     settings: ClassVar[list[str]]
+    at: ClassVar[str]
     spares_static: ClassVar[bool]
     personal: ClassVar[bool]
     injectable: ClassVar[bool]
@@ -76,7 +78,7 @@ class Effect:
         if not name:  # a base of several
             return
         row, KINDS[name] = TABLE[name], cls
-        cls.name, cls.unit, cls.hint = name, row["unit"], row["hint"]
+        cls.name, cls.unit, cls.hint, cls.at = name, row["unit"], row["hint"], row.get("place", "")
         cls.least, cls.most = float(row["least"]), float(row["most"])
         every = {"segments": SEGMENTS, "joints": JOINTS}
         cls.targets = row["targets"].format(**{k: ", ".join(x) for k, x in every.items()})
@@ -126,7 +128,7 @@ class Effect:
 
     def place(self) -> str:
         """Segment, plate channel, marker or joint that it sits at, for the truth."""
-        return ""
+        return self.at.format(**vars(self))
 
     def record(self) -> dict[str, Any]:
         """The drawn parameters, for the truth, as JSON has them."""
@@ -150,9 +152,6 @@ class OnSegment(Effect):
     def position_m(self, person: Person) -> np.ndarray:
         """(3,) in the segment's frame."""
         return person.segment_inertias()[self.segment].com_m
-
-    def place(self) -> str:
-        return self.segment
 
     def facts(self, person: Person) -> dict[str, Any]:
         return {"position_m": self.position_m(person).tolist()}

@@ -189,9 +189,6 @@ class Breathing(Effect, name="breathing"):
         dipole = self.size * wave[:, None] * OUTWARD
         return plan.with_load(ChestMotion("thorax", person.inertias["thorax"].com_m, dipole))
 
-    def place(self) -> str:
-        return "upper_torso"
-
 
 @dataclass(frozen=True, eq=False)
 class ChestMotion(Load):

@@ -28,19 +28,15 @@ STEPS = range(-8, 8)  # planned before and after the one on the plate
 
 
 @dataclass(frozen=True)
-class Gait:
-    """A steady gait. Step 0 starts at 0 s (its foot touches down) and lies on the plate.
+class Style:
+    """What all gaits of a kind share.
 
-    step_s : from one touch-down to the next. stance_s : contact of one foot.
     rise_s, fall_s : in which a swinging foot gains and loses its speed.
     toe_roll_rad, heel_roll_rad : largest heel rise, and toe rise at touch-down.
     toe_roll_share : part of the stance after which the heel rises.
     cop_from, cop_to : centre of pressure ahead of the ankle, in lengths of the foot.
     """
 
-    speed_m_s: float
-    step_s: float
-    stance_s: float
     half_width_m: float
     rise_s: float
     fall_s: float
@@ -52,6 +48,18 @@ class Gait:
     cop_to: float
     arm_swing_rad: float
     elbow_rad: float
+
+
+@dataclass(frozen=True)
+class Gait(Style):
+    """A steady gait. Step 0 starts at 0 s (its foot touches down) and lies on the plate.
+
+    step_s : from one touch-down to the next. stance_s : contact of one foot.
+    """
+
+    speed_m_s: float
+    step_s: float
+    stance_s: float
     first_side: str
 
     def side_of(self, k: int) -> str:
@@ -59,25 +67,20 @@ class Gait:
         return self.first_side if k % 2 == 0 else other_side(self.first_side)
 
 
+_rad = np.deg2rad
+WALKING = Style(0.05, 0.24, 0.10, 0.04, _rad(58), _rad(24), 0.50, -0.20, 0.68, _rad(22), _rad(10))
+RUNNING = Style(0.035, 0.13, 0.05, 0.14, _rad(75), _rad(20), 0.45, 0.10, 0.68, _rad(28), _rad(75))
+
+
 def walking(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
     """A part of walking around one stance on the plate."""
     size = person.stature_m / 1.7
     step_s = rng.uniform(0.50, 0.53)
     gait = Gait(
+        **vars(WALKING),
         speed_m_s=rng.uniform(1.18, 1.28) * size,
         step_s=step_s,
         stance_s=1.14 * step_s,
-        half_width_m=0.05,
-        rise_s=0.24,
-        fall_s=0.10,
-        clearance_m=0.04,
-        toe_roll_rad=np.deg2rad(58.0),
-        heel_roll_rad=np.deg2rad(24.0),
-        toe_roll_share=0.50,
-        cop_from=-0.20,
-        cop_to=0.68,
-        arm_swing_rad=np.deg2rad(22.0),
-        elbow_rad=np.deg2rad(10.0),
         first_side=str(rng.choice(SIDES)),
     )
     sketch = _sketch(person, gait, duration_s)
@@ -95,20 +98,10 @@ def running(person: Person, rng: np.random.Generator, duration_s: float, _ball: 
     size = person.stature_m / 1.7
     step_s = round(rng.uniform(0.335, 0.35), 3)
     gait = Gait(
+        **vars(RUNNING),
         speed_m_s=rng.uniform(2.7, 2.9) * size,
         step_s=step_s,
         stance_s=round(0.70 * step_s, 3),
-        half_width_m=0.035,
-        rise_s=0.13,
-        fall_s=0.05,
-        clearance_m=0.14,
-        toe_roll_rad=np.deg2rad(75.0),
-        heel_roll_rad=np.deg2rad(20.0),
-        toe_roll_share=0.45,
-        cop_from=0.10,
-        cop_to=0.68,
-        arm_swing_rad=np.deg2rad(28.0),
-        elbow_rad=np.deg2rad(75.0),
         first_side=str(rng.choice(SIDES)),
     )
     sketch = _sketch(person, gait, duration_s)

@@ -50,6 +50,12 @@ def read_tables(
             notes.append(str(refusal))
             continue
         notes += table.notes
+        named = [row.id for row in table.rows]
+        if wanted.keys().isdisjoint(plain(one.removeprefix("sub-")).casefold() for one in named):
+            notes.append(
+                f"{file} names {listed(named)}, and nobody of these is found: the people here are "
+                f"{listed(wanted.values())}; write what it says into the study's participants.tsv"
+            )
         for row in table.rows:
             name = wanted.get(plain(row.id.removeprefix("sub-")).casefold())
             if name is None or name in said:
@@ -179,7 +185,7 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
             "no recording can be used" if unused else "no files",
             file=", ".join(map(str, given)),
             expected="C3D files, or TRC files with their MOT or STO next to them",
-            remedy="correct what is said of each" if unused else "name the folder they lie in",
+            remedy=_remedy(unused),
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
@@ -187,6 +193,12 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
     _write(plan)
     _say(_in_words(plan))
     return 3 if any(one.is_fault for one in unused) else 0
+
+
+def _remedy(unused: Sequence[Unused]) -> str:
+    if any(one.why != NO_RECORDING for one in unused):
+        return "correct what is said of each"
+    return "export the trials so, or name the folder they lie in"
 
 
 def _check_out(out: Path) -> None:

@@ -126,8 +126,8 @@ def _about_joints(person: Person, q: np.ndarray) -> Iterator[Doubt]:
             yield Doubt(
                 f"the {in_words(joint)} is turned by {turned:.0f} degrees from standing straight",
                 f"less than {limit:.0f} degrees",
-                "left and right labels exchanged on one side of the joint, or a label on another "
-                "segment",
+                "left and right, or medial and lateral, labels exchanged on one side of the joint, "
+                "or a label on another segment",
                 True,
             )
 

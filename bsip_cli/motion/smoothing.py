@@ -122,10 +122,11 @@ def smooth_motion(
     known = determined.reshape(len(q), -1) & np.ones(len(skeleton.joints), dtype=bool)
     whole = np.asarray(known.all(axis=1))
     if whole.sum() < 12:
+        is_short = len(q) < 12
         raise BadDataError(
-            f"{int(whole.sum())} frames with a pose",
+            f"{int(whole.sum())} of {len(q)} frames with a pose",
             expected="at least 12 to differentiate",
-            remedy="check the markers of this trial",
+            remedy="leave so short a trial out" if is_short else "check the markers of this trial",
         )
     joint_of_curve = np.repeat(
         np.arange(len(skeleton.joints)), np.diff([*skeleton.q_starts, q.shape[1]])

@@ -119,7 +119,10 @@ def foot_contacts(
         off, name = on_ground[side] & ~on_plate[side], _SIDES.get(side, side) + " foot"
         measured &= ~off & foot.seen
         beside = beside | off
-        said = ((off, "on the floor beside the plates"), (~foot.seen, "no foot marker seen"))
+        said = (
+            (off & usable, "on the floor beside the plates"),
+            (~foot.seen, "no foot marker seen"),
+        )
         for mask, words in said:
             if mask.any():
                 reasons.append(_finding(name, f"{words}: {times(mask, rate_hz, *_SAID)}"))

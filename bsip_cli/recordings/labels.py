@@ -156,7 +156,7 @@ def person_of(
             f"{len(others)} people in one file: {listed}",
             expected="one person per recording",
             remedy="export one file per person, or say whose markers count: in study.toml "
-            f'[ingest] prefixes = {{ sub-01 = "{one}" }}, for bsip markers --prefix',
+            f'[ingest] prefixes = {{ sub-XX = "{one}" }}, for bsip markers --prefix',
         )
     known = (*known, chosen)
     joined = {"", chosen.head} - {affix.head for affix in rivals}

@@ -43,7 +43,7 @@ _TRIED = (
 )
 _LOOK_AT = {
     False: "Look first whether the plate stands where its corners say: in the markers' frame, "
-    "calibrated in the same session, not moved since",
+    "calibrated in the same session, not moved since, and whether anything else stood on it",
     True: "Look first whether these are the forces of this trial and of this person alone, on one "
     "clock with the markers, and whether the labels are those of the markers",
 }

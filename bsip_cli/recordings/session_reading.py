@@ -189,6 +189,8 @@ def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
     chosen = _corrected(hypotheses)
     verdicts = {name: _verdict(hypotheses[0].fits[name], chosen, name) for name in chosen.of.fits}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
+    if chosen.is_no_person and (found := _without_others_loads(trials, verdicts, limits)):
+        return replace(found, plates=found.plates | repeated)
     return SessionReading(
         chosen.of.frame,
         verdicts | repeated,
@@ -197,6 +199,23 @@ def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
         log_posterior=chosen.of.log_posterior + sum(one.delay.log_posterior for one in trials),
         of_paces=tuple(one.tolist() for one in chosen.of.of_paces.values()),
     )
+
+
+def _without_others_loads(
+    trials: Sequence[TrialSamples], verdicts: Mapping[str, Verdict], limits: GateLimits
+) -> SessionReading | None:
+    """Where some plates' loads lie beside the feet, which all stand on the others: a thing or
+    another person on a plate says nothing against those. None where these make no person either."""
+    beside = {name: one for name, one in verdicts.items() if one.refusal not in ("", AGAINST)}
+    rest = [trial.without(beside) for trial in trials]
+    rest = [trial for trial in rest if trial.sources]
+    if not beside or not rest or not all(trial.bears_all_feet() for trial in rest):
+        return None
+    found = _reading(rest, limits)
+    if any(one.refusal for one in found.plates.values()):
+        return None
+    log_posterior = found.log_posterior + _UNKNOWN
+    return replace(found, plates=found.plates | beside, log_posterior=log_posterior)
 
 
 # --- the choice -------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ forces and body go together best within 0.04 s of the stated time, if at all, an
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -201,6 +202,8 @@ def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
 
 _FEW = 100  # samples that each plate of a trial is seen by
 _LOADED = 0.05  # of the largest force: less is nobody
+_BLOCK_S = 0.02  # over which a total is averaged: filters leave it as it is
+_SAME = 0.999  # correlation of totals over equal times: nobody moves twice so alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +213,7 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be.
+    another ``delay``, of each that may be. ``total_N`` : the plates' vertical force in each 20 ms.
     """
 
     name: str
@@ -227,10 +230,13 @@ class TrialSamples:
     mass_kg: float = 0.0
     delay: Delay = NO_DELAY
     late: tuple[TrialSamples, ...] = ()
+    total_N: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
+        if stated.sources:
+            stated = replace(stated, total_N=_total_N(opened))
         found = lags(opened, limits) if stated.sources else None
         if found is None:
             return stated
@@ -277,6 +283,11 @@ class TrialSamples:
     def without(self, plates: Collection[str]) -> TrialSamples:
         return replace(self, sources={n: s for n, s in self.sources.items() if n not in plates})
 
+    def bears_all_feet(self) -> bool:
+        """Whether every foot on the ground stands on one of the plates, as the file has them."""
+        outlines = [source.plate(AS_STATED).corners_m for source in self.sources.values()]
+        return self.feet.all_on([one for one in outlines if one is not None])
+
     def in_frame(self, change: FrameChange) -> TrialSamples:
         """In other axes."""
         changed, matrix = self, change.matrix()
@@ -304,3 +315,28 @@ def _mass_kg(opened: Opened) -> float:
     carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
     loaded = carried[carried > _LOADED * carried.max(initial=0.0)]
     return float(np.percentile(loaded, 90)) if len(loaded) else 0.0
+
+
+def same_movements(trials: Sequence[TrialSamples]) -> list[tuple[str, str]]:
+    """Names of pairs that are one recording, exported twice: filtered, renamed, in two formats."""
+    return [
+        (one.name, other.name)
+        for one, other in combinations(trials, 2)
+        if _are_same(one.total_N, other.total_N)
+    ]
+
+
+def _are_same(one: np.ndarray, other: np.ndarray) -> bool:
+    n = min(len(one), len(other))
+    if max(len(one), len(other)) > n + 1 or n < _FEW:
+        return False
+    both = np.array([one[:n], other[:n]])
+    return bool(both.std(axis=1).all() and abs(np.corrcoef(both)[0, 1]) > _SAME)
+
+
+def _total_N(opened: Opened) -> np.ndarray:
+    """(n,) of all plates, as the file says."""
+    lifts = [np.where(s.usable, np.nan_to_num(lift_N(s)), 0.0) for s in opened.sources]
+    step = max(1, round(_BLOCK_S * opened.recording.analog_rate_hz))
+    total = np.sum(lifts, axis=0) if lifts else np.zeros(0)
+    return np.asarray(total[: len(total) // step * step].reshape(-1, step).mean(axis=1))

@@ -74,6 +74,13 @@ class Feet:
         points = np.where((inside | ~some)[..., None], self.points_m, np.nan)
         return replace(self, points_m=points)
 
+    def all_on(self, outlines: Sequence[np.ndarray]) -> bool:
+        """Whether each marker on the ground is on a plate of one of these corners (4, 3)."""
+        on = np.isnan(self.points_m[..., 0])
+        for corners_m in outlines:
+            on = on | (_beyond(self.points_m, corners_m) <= _RIM_M).all(axis=-1)
+        return bool(outlines) and bool(on.all())
+
     def at(self, samples: np.ndarray) -> Feet:
         return replace(self, points_m=self.points_m[samples])
 

@@ -23,7 +23,7 @@ from bsip_cli.recordings.plate_reading import FrameChange, Opened, PlateReading
 from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files
-from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.trial_samples import TrialSamples, same_movements
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.recordings.written import AS_WRITTEN, Written
 from bsip_cli.running.unit import Unit
@@ -34,6 +34,7 @@ _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
 _OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others")
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
+_NO_TEST = "what is found in one is no test of the other; remove one of them"
 
 
 def run(unit: Unit) -> None:
@@ -43,12 +44,14 @@ def run(unit: Unit) -> None:
     written: dict[str, dict[str, float]] = {name: {} for name in asdict(AS_WRITTEN)}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
-    _say_copies(unit, unit.person.trials)
+    copies = _say_copies(unit, unit.person.trials)
+    every: list[TrialSamples] = []
     for session in dict.fromkeys(trial.session for trial in unit.person.trials):
         mine = [trial for trial in unit.person.trials if trial.session == session]
         seen = _surveyed(unit, mine, limits)
         if not seen:
             continue
+        every += [one for one in seen if one.name not in copies]
         heights = [one.height_m for one in seen if one.height_m is not None]
         if heights and (fault := no_person(max(heights), unit.person.height_m)):
             found, expected, remedy = fault
@@ -68,6 +71,8 @@ def run(unit: Unit) -> None:
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
+    for first, again in same_movements(every):
+        unit.say(f"{again} shows the same movement as {first}: {_NO_TEST}")
     unit.write("readings", rows, facts | written)
 
 
@@ -106,9 +111,10 @@ def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict
     )
 
 
-def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
-    """One movement under two names would be held out from itself."""
+def _say_copies(unit: Unit, trials: Sequence[Trial]) -> set[str]:
+    """One movement under two names would be held out from itself; the names of copies."""
     first: dict[str, Trial] = {}
+    copies = set()
     for trial in trials:
         try:
             content = file_hash(trial.path)
@@ -116,10 +122,9 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
             continue
         one = first.setdefault(content, trial)
         if one is not trial:
-            unit.say(
-                f"{trial.path.name} is a copy of {one.path.name}: what is found in "
-                "one is no test of the other; remove one of them"
-            )
+            copies.add(trial.stem)
+            unit.say(f"{trial.path.name} is a copy of {one.path.name}: {_NO_TEST}")
+    return copies
 
 
 def _surveyed(

@@ -253,7 +253,7 @@ def read_people(file: Path) -> PeopleTable:
     for cells in table.rows:
         written = cells[index] if index < len(cells) else ""
         rows.append(Row(_id_of(written, file.parent), cells))
-        if written.isdigit() and rows[-1].id not in (written, f"sub-{written}"):
+        if rows[-1].id not in (written, f"sub-{written}"):
             renamed.append(f"{written} is {rows[-1].id}")
     tabs, is_utf = table.separator == "tabs", table.encoding != "cp1252"
     odd = [] if tabs else [f"its cells are separated by {table.separator}"]
@@ -275,17 +275,19 @@ def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:
 
 
 def _id_of(written: str, root: Path) -> str:
-    """The folder that a name means: ``01`` is sub-01 where that is there, and so is Excel's 1."""
-    if NAME.fullmatch(written) or not NAME.fullmatch(f"sub-{written}"):
-        return written
-    if is_folder(root / f"sub-{written}"):
-        return f"sub-{written}"
-    if written.isdigit():
-        found = [path.name for path in root.glob(f"sub-0*{written}") if is_folder(path)]
-        same = [name for name in found if name[4:].lstrip("0") == written.lstrip("0")]
-        if len(same) == 1:
-            return same[0]
-    return written
+    """The folder that a name means, case aside: ``01`` and ``Sub-01`` are sub-01 where that alone
+    is there, and so is Excel's 1."""
+    for name in (written, f"sub-{written}"):
+        if NAME.fullmatch(name) and is_folder(root / name):
+            return name
+    there = (path.name for path in root.glob("sub-*") if is_folder(path))
+    same = [name for name in there if NAME.fullmatch(name) and _bare(name) == _bare(written)]
+    return same[0] if len(same) == 1 else written
+
+
+def _bare(name: str) -> str:
+    """Without sub- and leading zeros, in small letters."""
+    return name.casefold().removeprefix("sub-").lstrip("0")
 
 
 def participant_of(row: Row, table: PeopleTable) -> Participant:

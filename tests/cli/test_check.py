@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.fuzz.fuzz_study import _write_trc_mot
+
 SAMPLE = Path(__file__).parents[2] / "sample_data"
 
 
@@ -54,3 +56,12 @@ def test_a_recording_under_two_names_is_said(bsip, study):
     answer = bsip("check", study)
     said = "sub-01_task-squat_run-2.c3d is a copy of sub-01_task-squat_run-1.c3d"
     assert answer.code == 0 and said in answer.err
+
+
+def test_a_recording_exported_again_is_said(bsip, study):
+    folder = study / "sub-01"
+    (folder / "sub-01_task-steps.c3d").unlink()
+    assert "the same movement" not in bsip("check", study).err
+    _write_trc_mot(folder / "sub-01_task-squat_run-1.c3d", folder / "sub-01_task-filtered")
+    said = "sub-01_task-squat_run-1 shows the same movement as sub-01_task-filtered"
+    assert said in bsip("check", study).err

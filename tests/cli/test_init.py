@@ -160,6 +160,15 @@ def test_a_table_of_people_among_the_files(lab, capsys):
     assert "height 165 of sub-Anna is taken as cm" in capsys.readouterr().out
 
 
+def test_a_table_of_other_people_is_said(lab, capsys):
+    (lab / "participants.tsv").write_text("participant_id\tsex\tmass_kg\nMeyer, Jo\tM\t70\n")
+    assert made(lab)[0] == 0
+    said = (
+        "participants.tsv names Meyer, Jo, and nobody of these is found: the people here are sub-01"
+    )
+    assert said in capsys.readouterr().out
+
+
 # --- what is not used, and why --------------------------------------------------------------------
 
 

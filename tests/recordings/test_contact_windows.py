@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
@@ -155,6 +157,13 @@ def test_unusable_samples_and_unseen_feet_are_left_out():
     expected[50:60] = expected[100:120] = False
     np.testing.assert_array_equal(result.valid, expected)
     assert len(result.reasons) == 2
+
+
+def test_samples_that_the_table_lacks_put_no_foot_beside_the_plates():
+    there = np.arange(N) >= 100
+    plate = replace(_plate(np.where(there, WEIGHT_N, 0.0), corners=None), usable=there)
+    result = _windows(_foot(0.1), _foot(0.4), [plate])
+    assert ["force samples unusable" in one.found for one in result.reasons] == [True]
 
 
 def test_windows_shorter_than_a_tenth_of_a_second_are_dropped():

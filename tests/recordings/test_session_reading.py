@@ -12,7 +12,7 @@ from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.hypothesis import Hypothesis
 from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
-from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
+from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, LocalWrench, measured, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
@@ -22,6 +22,7 @@ from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
     LABELS,
     corners,
+    free_moment,
     motion,
     of_c3d,
     of_table,
@@ -246,6 +247,35 @@ def _renamed(source, name: str, force: np.ndarray) -> dict:
         return {"name": name, "force_N": force}
     description = replace(source.description, name=name)
     return {"description": description, "measured": np.hstack([force, source.measured[:, 3:]])}
+
+
+def _with_a_load(place_m: tuple[float, float], weight_N: float) -> list[C3dPlate]:
+    """And a third plate, 2 m ahead, on which something stands at a place on it."""
+    one, two = of_c3d()
+    stated = replace(one.description, name="3", corners_m=corners(0) + np.array([2.0, 0.0, 0.0]))
+    axes = stated.rotation_lab_plate()
+    force = np.tile([0.0, 0.0, weight_N], (len(one.measured), 1))
+    moment = np.cross([*place_m, 0.0], force) + free_moment(force)
+    at_sensor = LocalWrench(force @ axes, moment @ axes).at_surface(-stated.origin_m)
+    channels = np.hstack([at_sensor.force_N, at_sensor.moment_Nm])
+    return [one, two, replace(one, description=stated, measured=channels)]
+
+
+@pytest.mark.parametrize("place_m", [(0.1, 0.05), (-0.25, 0.2)])
+@pytest.mark.parametrize("weight_N", [200.0, 550.0])
+def test_what_stands_on_another_plate_says_nothing_against_the_persons(place_m, weight_N):
+    trial = opened(_with_a_load(place_m, weight_N))
+    session = session_reading([TrialSamples.of(trial)])
+    assert "beside the feet" in session.plates["3"].refusal
+    assert [plate.name for plate in assemble(trial, session).plates] == ["1", "2"]
+
+
+def test_a_plate_that_the_person_stands_on_is_no_others():
+    """Without it the other one bears nobody."""
+    one, two = of_c3d()
+    far = replace(two.description, corners_m=two.description.corners_m + np.array([1.5, 0.0, 0.0]))
+    trial = opened([one, replace(two, description=far)])
+    assert assemble(trial, session_reading([TrialSamples.of(trial)])).plates == ()
 
 
 def test_forces_that_no_reading_brings_under_the_feet_are_refused():

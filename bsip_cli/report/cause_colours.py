@@ -25,15 +25,18 @@ _CSS = {
 @dataclass(frozen=True)
 class Piece:
     """What some terms of the error budget, taken together where they look alike, make of an
-    error [%]."""
+    error [%]. ``perhaps``: of the unknown part, the faults that may make it but are no findings."""
 
     label: str
     share: float
     terms: tuple[str, ...]
+    perhaps: str = ""
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Keys of ``COLOURS``."""
+        if UNKNOWN in self.terms:  # whatever may make it
+            return (UNKNOWN,)
         return tuple(dict.fromkeys(term.partition(":")[0] for term in self.terms))
 
 

@@ -4,7 +4,8 @@ still be used, and for what."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -31,12 +32,14 @@ from bsip_cli.report.words import (
     task_of,
     trial_label,
 )
-from bsip_cli.statistics.methods import OM
+from bsip_cli.statistics.methods import OM, RM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
 _OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
+_USABLE = ("full", "care")  # as they are
 _MOST_REASONS = 4  # in a line
 _MOST_RUNS = 4  # of a task, in a line
+_once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 
 
 # --- how large ----------------------------------------------------------------------------------
@@ -54,6 +57,7 @@ def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yard
     return tuple((one, values[one.name]) for one in _yardsticks(record))
 
 
+@_once
 def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
     """The yardsticks beyond which the errors of all recordings together are."""
     return _large(measured_of(record))
@@ -84,6 +88,7 @@ def largest_in(record: ParticipantRecord, trial: TrialRecord) -> tuple[TrialReco
     return trial, max(own, key=lambda pair: np.nan_to_num(pair[1]) / pair[0].limit)[0]
 
 
+@_once
 def names_of(record: ParticipantRecord) -> dict[str, str]:
     """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
     tasks = [task_of(trial.stem) for trial in record.trials]
@@ -111,20 +116,27 @@ def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick
 
 
 def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
-    return [(one, size) for one, size in sizes if one.words(size) == "large"]
+    return [(one, size) for one, size in sizes if one.is_large(size)]
 
 
 # --- the answer, and the finding that it is -------------------------------------------------------
 
 
+@_once
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
     large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
     alone = [names_of(record)[trial.stem] for trial in large_alone(record, with_markers=True)]
     tables = record.diagnosis, record.detection, record.budget
-    return verdict.light_of(*tables, large, record.use(), alone)
+    before = int(bool(large) and not is_said(record))  # `large_finding`
+    light = verdict.light_of(*tables, large, record.use(), alone, before)
+    if om_waits(record) and _large(measured_of(record, RM)):  # which is for now
+        title = light.title.replace("no large error", f"no large error with {OM}")
+        light = replace(light, title=title)
+    return light
 
 
+@_once
 def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     """The first finding where errors are large and the diagnosis has none that says so: how large,
     where most, whether the cause is known; else none."""
@@ -164,7 +176,9 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
     if number_of := number_of_main_part(record):
         return f"the largest part is finding {number_of}"
-    return "" if part.label in light_for(record).title else f"the largest part is {part.label}"
+    if part.label in light_for(record).title:
+        return ""
+    return f"the largest {'other ' if record.use() == OM else ''}part is {part.label}"
 
 
 def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
@@ -178,8 +192,9 @@ def number_of_main_part(record: ParticipantRecord) -> int:
         return 0
     part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
     label = "" if part is None else part.label
-    numbered = enumerate(record.causes, start=1 if is_said(record) else 2)
-    return next((k for k, c in numbered if effect_title(c[0].effect) in label), 0)
+    first = 1 if is_said(record) else 2
+    causes = enumerate(record.causes, start=first)
+    return next((k for k, c in causes if effect_title(c[0].effect) in label), 0)
 
 
 # --- which recordings may be used ---------------------------------------------------------------
@@ -232,14 +247,23 @@ def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
 def must_wait(record: ParticipantRecord) -> str:
     """Why the parameters should not be used yet, and what to do: not all recordings that identified
     those to use may be used themselves, or errors are large and no recording may; else empty."""
-    uses, names = uses_of(record), names_of(record)
-    usable = {stem for stem, use in uses.items() if use.kind in ("full", "care")}
-    own = [t.stem for t in record.identification_trials() if t.stem not in usable]
-    if record.use() == OM and own:
-        return TEXTS["usable"]["identified"].format(trials=listing([names[stem] for stem in own]))
-    return TEXTS["usable"]["large"] if light_for(record).state == "large" and not usable else ""
+    if own := om_waits(record):
+        return TEXTS["usable"]["identified"].format(trials=listing(own))
+    usable = any(use.kind in _USABLE for use in uses_of(record).values())
+    is_large = light_for(record).state == "large"
+    return TEXTS["usable"]["large"] if is_large and not usable else ""
 
 
+@_once
+def om_waits(record: ParticipantRecord) -> list[str]:
+    """Names of the recordings for which OM, where that is to be used, has to wait."""
+    own = record.identification_trials() if record.use() == OM else ()
+    causes = dict(enumerate(record.causes))
+    kinds = {trial.stem: _use_of(record, trial, causes).kind for trial in own}
+    return [names_of(record)[stem] for stem, kind in kinds.items() if kind not in _USABLE]
+
+
+@_once
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     """Of each recording, by its stem, as far as its errors and the findings tell."""
     causes = numbered(record)

@@ -160,7 +160,9 @@ def test_large_alone_is_in_the_title(record):
     *_, to_do = front(replace(far, refusals=()))
     assert len(to_do.items) == 1 and to_do.items[0].startswith("In sequence look for feet or hands")
     both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
-    assert light_for(both).title == "1 fault found; no large error except in sequence"
+    assert light_for(both).title == (
+        "1 finding: force plate turned or tilted; no large error except in sequence"
+    )
 
 
 def test_a_large_error_comes_first_and_counts(record):
@@ -233,9 +235,8 @@ def test_what_makes_the_largest_part_in_a_recording_says_what_helps(record):
     assert "error of unknown cause" not in first_to_do("unknown")
     assert first_to_do("unknown").startswith("Finding 1: In basketball look for feet or hands")
     assert first_to_do("fault:plate_rotation").startswith("Finding 2: Correct the forces")
-    assert "forces and markers out of step (no finding of its own) may make" in first_to_do(
-        "fault:sync_offset"
-    )
+    unconfirmed = first_to_do("fault:sync_offset")  # unknown, as nobody can say that it is there
+    assert unconfirmed.startswith("Finding 1: In basketball look for feet or hands")
 
 
 def test_a_large_error_elsewhere_is_a_finding_of_its_own(record):
@@ -325,7 +326,7 @@ def test_findings_without_room_are_named_with_their_numbers(record):
         *(fault(effect, SEQUENCE, **skin) for effect in ("missing_joint", "soft_tissue")),
         *(fault("soft_tissue", stem) for stem in TRIALS),
     )
-    (links,) = (block for block in front(many) if isinstance(block, Links))
+    links, _ = (block for block in front(many) if isinstance(block, Links))
     assert links.to == (("More below", "#wrong"),)
     assert links.rest == (
         f". 3: plate 1 is turned by +2.0 degrees; 4 to 6: {effect_title('soft_tissue')}, or 1 "

@@ -220,7 +220,7 @@ def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
         number(facts["mass_kg"], 2),
         signed(100.0 * (facts["plate_mass_kg"] / facts["mass_kg"] - 1.0), 1),
         number(facts["height_m"], 2),
-        *(Cell(number(v), "warning" if one.words(v) == "large" else "") for one, v in values),
+        *(Cell(number(v), "warning" if one.is_large(v) else "") for one, v in values),
         number(identified.get("duration_s")),
         significant(identified.get("condition_number")),
         refusals,

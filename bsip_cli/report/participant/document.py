@@ -333,6 +333,7 @@ def diagnosis_section(record: records.ParticipantRecord) -> Section:
     blocks = (
         *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
         *(Paragraph(text) for text in (*verdict.corrected_sentence(events), *said.results)),
+        *([Heading("What to do"), Bullets(said.advice)] if said.advice else []),
         *nearest(candidates_of(record.diagnosis)),
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),

@@ -395,12 +395,13 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     large: list[Piece] = []
     noise: list[Piece] = []
     unknown: list[tuple[str, float]] = []
+    shares = {str(term): float(share) for term, share in rows["share_percent"].items()}
     for terms in _groups(rows):
         faults = {term for term in terms if term.startswith(_FAULT)}
         named = {term for term in faults if term.removeprefix(_FAULT) in found}
-        share = float(rows.loc[list(terms), "share_percent"].sum())
+        share = sum(shares[term] for term in terms)
         if {*terms} <= faults - named | {UNKNOWN}:
-            unknown += [(term, float(rows.loc[term, "share_percent"])) for term in terms]
+            unknown += [(term, shares[term]) for term in terms]
             continue
         piece = Piece(_label(terms, faults, named), share, terms)
         if piece.label == NOISE:

@@ -15,11 +15,13 @@ from bsip_cli.report.effect_words import effect_title, separating_recording
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
+    is_of_parameters,
     is_said,
     large_alone,
     large_finding,
     largest_in,
     light_for,
+    main_part,
     measured_of,
     must_wait,
     names_of,
@@ -213,9 +215,10 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-        said.append(TEXTS["sure"]["known" if known else "unknown"])
-        unseen = unseen if known else ""
+        known = "unknown" if main_part(record) is None else "known"
+        known = "part" if known == "known" and is_of_parameters(record) else known
+        said.append(TEXTS["sure"][known])
+        unseen = unseen if known == "known" else ""
     elif not record.causes:
         said.append("No fault is more probable than not.")
     said.append(unseen)
@@ -253,10 +256,12 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
     if pieces := errors.numbered_pieces(record.budget, findings):
         use = record.use()
-        known = f"{errors.PARAMETERS} (OM corrects these)" if use == OM else errors.PARAMETERS
-        pieces = tuple(replace(p, label=p.label.replace(errors.PARAMETERS, known)) for p in pieces)
-        error = errors.BEFORE if use != RM else "squared error"
-        yield blocks.Bar(f"What makes the {error} of forces ({TEXTS['another_scale']}):", pieces)
+        if use == OM and not (om_waits(record) or beyond(record)):
+            known = f"{errors.PARAMETERS} (OM corrects these)"
+            labels = (p.label.replace(errors.PARAMETERS, known) for p in pieces)
+            pieces = tuple(replace(p, label=x) for p, x in zip(pieces, labels, strict=True))
+        before = " before identification" if use != RM else ""
+        yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 
 
 # --- what to do ---------------------------------------------------------------------------------

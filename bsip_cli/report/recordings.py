@@ -12,6 +12,7 @@ import numpy as np
 from bsip_cli.report import verdict
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
+from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
 from bsip_cli.report.errors import (
     COP,
@@ -169,16 +170,26 @@ def is_said(record: ParticipantRecord) -> bool:
 def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells; nothing
     where the light says it."""
-    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    part = main_part(record)
     if part is None:
         if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
             return "other findings explain part at most"
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
-    if number_of := number_of_main_part(record):
-        return f"the largest part is finding {number_of}"
-    if part.label in light_for(record).title:
-        return ""
-    return f"the largest {'other ' if record.use() == OM else ''}part is {part.label}"
+    besides = " besides the table's parameters" if is_of_parameters(record) else ""
+    if number_of := _number_of(record, part):
+        return f"the largest part{besides} is finding {number_of}"
+    in_title = part.label in light_for(record).title
+    return "" if in_title else f"the largest part{besides} is {part.label}"
+
+
+def main_part(record: ParticipantRecord) -> Piece | None:
+    """Of a large error, what makes the largest part; None if unknown."""
+    return verdict.main_part(record.budget, effects_in(record.causes), record.use())
+
+
+def is_of_parameters(record: ParticipantRecord) -> bool:
+    """Whether OM should have taken the largest part away, so that nobody knows what is left."""
+    return verdict.is_of_parameters(record.budget, effects_in(record.causes), record.use())
 
 
 def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
@@ -188,13 +199,14 @@ def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
 
 def number_of_main_part(record: ParticipantRecord) -> int:
     """Of the finding that makes the largest part of a large error of forces; 0 if none does."""
-    if all(one.name == MARKERS for one, _ in beyond(record)):
-        return 0
-    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-    label = "" if part is None else part.label
-    first = 1 if is_said(record) else 2
-    causes = enumerate(record.causes, start=first)
-    return next((k for k, c in causes if effect_title(c[0].effect) in label), 0)
+    part = main_part(record)
+    of_markers = all(one.name == MARKERS for one, _ in beyond(record))
+    return 0 if part is None or of_markers or is_of_parameters(record) else _number_of(record, part)
+
+
+def _number_of(record: ParticipantRecord, part: Piece) -> int:
+    causes = enumerate(record.causes, start=1 if is_said(record) else 2)
+    return next((k for k, c in causes if effect_title(c[0].effect) in part.label), 0)
 
 
 # --- which recordings may be used ---------------------------------------------------------------

@@ -162,9 +162,9 @@ def light_of(
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    most, of_rm = main_part(budget, found, use), main_part(budget, found)
-    if use == OM and of_rm is not None and errors.PARAMETERS in of_rm.label:
+    if is_of_parameters(budget, found, use):
         return " even with identified parameters"
+    most = main_part(budget, found, use)
     if most is not None:
         how = "most" if most.share > 50.0 else "the largest part"
         return f", {how} of it {most.label} ({number(most.share, 0)} %)"
@@ -179,6 +179,13 @@ def main_part(budget: pd.DataFrame | None, found: Collection[str], use: str = RM
     left = [one for one in parts if use != OM or errors.PARAMETERS not in one.label]
     most = max(left, key=lambda one: one.share, default=None)
     return None if most is None or most.label in (errors.UNKNOWN, errors.NOISE) else most
+
+
+def is_of_parameters(budget: pd.DataFrame | None, found: Collection[str], use: str) -> bool:
+    """Whether the table's parameters make the largest part, and OM, which should have taken that
+    away, has not."""
+    part = main_part(budget, found)
+    return use == OM and part is not None and errors.PARAMETERS in part.label
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints: str = "") -> str:

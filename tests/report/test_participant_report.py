@@ -141,10 +141,10 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
     assert "the errors? ● RM, ○ OM (basketball: RM) (not to be used yet)" in first
     assert (
-        "What makes the squared error before identification of forces (joint moments are another "
+        "What makes the squared error of forces before identification (joint moments are another "
         "scale):" in first
     )
-    assert "the table's segment parameters (OM corrects these) 70 %" in first
+    assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
     corrected = "sequence (finding 1); basketball (findings 1 and"

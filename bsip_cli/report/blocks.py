@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from html import unescape
@@ -51,6 +51,14 @@ class Heading(Block):
 class Bullets(Block):
     items: tuple[str, ...]
     tone: Tone = "plain"
+
+
+def first_of(
+    lines: Sequence[str], most: int, where: str, tone: Tone = "plain"
+) -> tuple[Block, ...]:
+    """So many of the lines, and how many more there are where."""
+    more = (Paragraph(f"{len(lines) - most} more in {where}.", "note"),)
+    return Bullets(tuple(lines[:most]), tone), *(more if len(lines) > most else ())
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@ distinguish."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bsip_cli.report.words import TEXTS
@@ -69,10 +69,3 @@ def fills(pieces: Iterable[Piece]) -> dict[str, Fill]:
             faults += 1
         found[piece.label] = Fill(tuple(COLOURS[kind] for kind in piece.kinds), hatch)
     return found
-
-
-def ordered(labels: Iterable[str], last: Sequence[str]) -> Iterator[str]:
-    """Each label once, those of ``last`` at the end."""
-    known = dict.fromkeys(labels)
-    yield from (one for one in known if one not in last)
-    yield from (one for one in last if one in known)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
-from bsip_cli.report.cause_colours import Piece
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -306,10 +306,8 @@ def _error(fit: pd.DataFrame) -> Mapping[str, float]:
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 BEFORE = "squared error before identification"  # RM's, of which the budget is
 REST = "small parts"
-UNKNOWN = "unknown"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
-NOISE = "noise"
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
 _MOST_LIKE = 2  # faults that a part is like

@@ -13,7 +13,7 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
-from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Terms
+from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Terms, first_of
 from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
 from bsip_cli.statistics.methods import MEASURED, RM, is_extended
@@ -229,19 +229,13 @@ def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
         for stage, unit, text in made.messages
     ]
     blocks: list[Block] = [Heading("Warnings")]
-    if said:
-        blocks.append(Bullets(tuple(said[:_MOST_WARNINGS])))
-    if len(said) > _MOST_WARNINGS:
-        blocks.append(Paragraph(f"{len(said) - _MOST_WARNINGS} more in the artifacts.", "note"))
-    if not said:
-        blocks.append(Paragraph("No stage had anything to warn of."))
+    nothing = (Paragraph("No stage had anything to warn of."),)
+    blocks += first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
     shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
-    blocks.append(Heading("Options that differ from the shipped ones"))
-    if changed:
-        blocks.append(Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items()))))
-    else:
-        blocks.append(Paragraph("None."))
+    differ = Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items())))
+    blocks += [Heading("Options that differ from the shipped ones")]
+    blocks += [differ if changed else Paragraph("None.")]
     versions = (f"{name} {' / '.join(sorted(v))}" for name, v in sorted(made.versions.items()))
     blocks += [Heading("Versions"), Paragraph(", ".join(versions))]
     if made.files:

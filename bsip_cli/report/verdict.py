@@ -25,7 +25,7 @@ from bsip_cli.report.candidates import (
     limits_of,
     limits_sentence,
 )
-from bsip_cli.report.cause_colours import Piece
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     WEIGHT,
@@ -153,7 +153,7 @@ def light_of(
     share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
     named = "" if np.isnan(share) else f"What was found makes {size} of the {errors.BEFORE}."
-    if len(causes) == len(causes[0]) == 1:
+    if len({effect_title(one.effect) for cause in causes for one in cause}) == 1:
         found += f": {effect_title(causes[0][0].effect)}"
     title = found if large is None else f"{found}; {no_large}"
     return Light("cause", title, named or f"Searched: {looked}.")
@@ -178,7 +178,7 @@ def main_part(budget: pd.DataFrame | None, found: Collection[str], use: str = RM
     parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
     left = [one for one in parts if use != OM or errors.PARAMETERS not in one.label]
     most = max(left, key=lambda one: one.share, default=None)
-    return None if most is None or most.label in (errors.UNKNOWN, errors.NOISE) else most
+    return None if most is None or most.label in (UNKNOWN, NOISE) else most
 
 
 def is_of_parameters(budget: pd.DataFrame | None, found: Collection[str], use: str) -> bool:

@@ -21,6 +21,7 @@ from bsip_cli.report.blocks import (
     Numbered,
     Paragraph,
     Section,
+    first_of,
     picture,
 )
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
@@ -151,10 +152,7 @@ def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
         yield Paragraph("Nothing was repaired, excluded or warned of.")
         return
     yield Heading("Repaired, left out, warned of")
-    yield Bullets(tuple(lines[:_MOST_FINDINGS]))
-    if len(lines) > _MOST_FINDINGS:
-        more = count(len(lines) - _MOST_FINDINGS, "more finding")
-        yield Paragraph(f"{more} in the recordings' quality artifacts.", "note")
+    yield from first_of(lines, _MOST_FINDINGS, "the recordings' quality artifacts")
 
 
 # --- markers ------------------------------------------------------------------------------------
@@ -187,11 +185,7 @@ def _events(record: records.ParticipantRecord) -> Iterator[Block]:
     if known and not lines:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
     elif lines:
-        yield Bullets(tuple(lines[:_MOST_EVENTS]))
-        if len(lines) > _MOST_EVENTS:
-            yield Paragraph(
-                f"{len(lines) - _MOST_EVENTS} more in the trials' marker-events.", "note"
-            )
+        yield from first_of(lines, _MOST_EVENTS, "the trials' marker-events")
 
 
 # --- which segment parameters come out, how sure they are, and in which movements to use them -----

@@ -15,7 +15,6 @@ from bsip_cli.report.effect_words import effect_title, separating_recording
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
-    is_of_parameters,
     is_said,
     large_alone,
     large_finding,
@@ -215,8 +214,8 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        known = "unknown" if main_part(record) is None else "known"
-        known = "part" if known == "known" and is_of_parameters(record) else known
+        part, is_left = main_part(record)
+        known = "unknown" if part is None else "part" if is_left else "known"
         said.append(TEXTS["sure"][known])
         unseen = unseen if known == "known" else ""
     elif not record.causes:

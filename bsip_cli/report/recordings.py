@@ -109,10 +109,7 @@ def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick
     """The yardsticks with a recording's own numbers, by the method to use."""
     fit = record.used_fit(trial)
     values = errors_of([] if fit is None else [fit])
-    markers = np.empty(0) if trial.kinematics is None else trial.kinematics["marker_rms_m"]
-    squares = np.asarray(markers, dtype=float) ** 2
-    squares = squares[np.isfinite(squares)]
-    values[MARKERS] = 1e3 * float(np.sqrt(squares.mean())) if len(squares) else np.nan
+    values[MARKERS] = trial.markers_mm()
     return tuple((one, values[one.name]) for one in _yardsticks(record))
 
 
@@ -170,26 +167,21 @@ def is_said(record: ParticipantRecord) -> bool:
 def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells; nothing
     where the light says it."""
-    part = main_part(record)
+    part, is_left = main_part(record)
     if part is None:
         if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
             return "other findings explain part at most"
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
-    besides = " besides the table's parameters" if is_of_parameters(record) else ""
+    besides = " besides the table's parameters" if is_left else ""
     if number_of := _number_of(record, part):
         return f"the largest part{besides} is finding {number_of}"
     in_title = part.label in light_for(record).title
     return "" if in_title else f"the largest part{besides} is {part.label}"
 
 
-def main_part(record: ParticipantRecord) -> Piece | None:
-    """Of a large error, what makes the largest part; None if unknown."""
+def main_part(record: ParticipantRecord) -> tuple[Piece | None, bool]:
+    """As `verdict.main_part`, of this person."""
     return verdict.main_part(record.budget, effects_in(record.causes), record.use())
-
-
-def is_of_parameters(record: ParticipantRecord) -> bool:
-    """Whether OM should have taken the largest part away, so that nobody knows what is left."""
-    return verdict.is_of_parameters(record.budget, effects_in(record.causes), record.use())
 
 
 def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
@@ -199,9 +191,9 @@ def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
 
 def number_of_main_part(record: ParticipantRecord) -> int:
     """Of the finding that makes the largest part of a large error of forces; 0 if none does."""
-    part = main_part(record)
+    part, is_left = main_part(record)
     of_markers = all(one.name == MARKERS for one, _ in beyond(record))
-    return 0 if part is None or of_markers or is_of_parameters(record) else _number_of(record, part)
+    return 0 if part is None or is_left or of_markers else _number_of(record, part)
 
 
 def _number_of(record: ParticipantRecord, part: Piece) -> int:

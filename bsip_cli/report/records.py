@@ -61,6 +61,12 @@ class TrialRecord:
     def label(self) -> str:
         return trial_label(self.stem)
 
+    def markers_mm(self) -> float:
+        """Root mean square distance of the markers from the model; NaN where it is not known."""
+        frame = self.kinematics
+        rms = pd.Series(dtype=float) if frame is None else frame["marker_rms_m"].astype(float)
+        return 1e3 * float(np.sqrt((rms**2).mean()))  # of those that are known
+
 
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
@@ -152,17 +158,10 @@ def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
 
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
-    methods = sorted(reconstruction["method"].unique(), key=method_rank)
-    clock = clock_of(reconstruction)
-    signals = reconstruction[["method", "time_s", column]].groupby("method")
-    return {
-        name: signals.get_group(name)
-        .drop_duplicates("time_s")
-        .set_index("time_s")[column]
-        .reindex(clock)
-        .to_numpy()
-        for name in methods
-    }
+    once = reconstruction.drop_duplicates(["method", "time_s"])
+    wide = once.pivot(index="time_s", columns="method", values=column)
+    wide = wide.reindex(clock_of(reconstruction))
+    return {name: wide[name].to_numpy() for name in sorted(wide, key=method_rank)}
 
 
 def measured_of(reconstruction: pd.DataFrame) -> pd.DataFrame:

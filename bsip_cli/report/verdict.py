@@ -162,30 +162,26 @@ def light_of(
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    if is_of_parameters(budget, found, use):
+    most, is_left = main_part(budget, found, use)
+    if is_left:
         return " even with identified parameters"
-    most = main_part(budget, found, use)
-    if most is not None:
-        how = "most" if most.share > 50.0 else "the largest part"
-        return f", {how} of it {most.label} ({number(most.share, 0)} %)"
-    return f", {CAUSE_UNKNOWN}"
+    if most is None:
+        return f", {CAUSE_UNKNOWN}"
+    how = "most" if most.share > 50.0 else "the largest part"
+    return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 
 
-def main_part(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> Piece | None:
-    """Of a large error with the method ``use``, what makes the largest part, with OM of what the
-    table's parameters leave; None if unknown. So nothing is of unknown cause whose bar has no such
-    part."""
+def main_part(
+    budget: pd.DataFrame | None, found: Collection[str], use: str = RM
+) -> tuple[Piece | None, bool]:
+    """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
+    that nothing is of unknown cause whose bar has no such part. And whether that is only what the
+    table's parameters leave, which OM should have taken away."""
     parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
-    left = [one for one in parts if use != OM or errors.PARAMETERS not in one.label]
-    most = max(left, key=lambda one: one.share, default=None)
-    return None if most is None or most.label in (UNKNOWN, NOISE) else most
-
-
-def is_of_parameters(budget: pd.DataFrame | None, found: Collection[str], use: str) -> bool:
-    """Whether the table's parameters make the largest part, and OM, which should have taken that
-    away, has not."""
-    part = main_part(budget, found)
-    return use == OM and part is not None and errors.PARAMETERS in part.label
+    ranked = sorted(parts, key=lambda one: -one.share)
+    is_left = use == OM and bool(ranked) and errors.PARAMETERS in ranked[0].label
+    most = next(iter(ranked[is_left:]), None)
+    return (None if most is None or most.label in (UNKNOWN, NOISE) else most), is_left
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints: str = "") -> str:

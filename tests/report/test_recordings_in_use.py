@@ -245,7 +245,7 @@ def test_nothing_is_of_unknown_cause_whose_bar_has_no_unknown_part(record):
     """OM errs, and the table's parameters, which it should have corrected, make most."""
     far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
     unknown = far.budget["term"] == "unknown"
-    assert main_part(far) is None and large_finding(far)[0].endswith("part at most.")
+    assert main_part(far) == (None, True) and large_finding(far)[0].endswith("part at most.")
     bent = far.budget["term"].mask(unknown, "trunk_and_shoulders")
     known = replace(far, budget=far.budget.assign(term=bent))
     assert large_finding(known)[0].endswith(

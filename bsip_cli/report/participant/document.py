@@ -107,8 +107,6 @@ def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
     compared = np.nan
     if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
         compared = float(records.flags_of(trial.reconstruction, "valid").mean())
-    rms = frame["marker_rms_m"].to_numpy(dtype=float)
-    rms = rms[np.isfinite(rms)]
     return (
         trial.label,
         role,
@@ -116,7 +114,7 @@ def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
         number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
         percent(compared),
         percent(float(frame["determined"].astype(float).mean())),
-        number(_MM * float(np.sqrt(np.mean(rms**2)))) if len(rms) else MISSING,
+        number(trial.markers_mm()),
     )
 
 

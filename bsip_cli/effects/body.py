@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import MappingProxyType
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_phi
@@ -218,6 +217,8 @@ def _swings(
     def response(numerator: list[float]) -> np.ndarray:
         """(N, 3) travel of the mass against its segment [m], or with s^2 its acceleration."""
         system = (numerator, [1.0, 2 * damping * pace, pace**2])
+        from scipy.signal import cont2discrete, lfilter  # heavy
+
         b, a, _ = cont2discrete(system, 1 / scene.rate_hz, method="foh")
         return lfilter(np.ravel(b), a, ground - ground[0], axis=0)
 

@@ -7,7 +7,6 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, sosfiltfilt
 from scipy.special import ndtr
 
 from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, explained_share, parts_xyz
@@ -390,6 +389,8 @@ class OverSmoothing(Effect):
 
 def _lost_m(scene: Scene, cutoff_hz: float) -> np.ndarray:
     """(N, m, 3) what the filter took from the markers, of the model's own, which have no noise."""
+    from scipy.signal import butter, sosfiltfilt  # heavy
+
     sections = butter(2, CORNER * cutoff_hz, fs=scene.rate_hz, output="sos")
     padding = min(len(scene.q) - 1, round(2 * scene.rate_hz / cutoff_hz))
     left, lost = scene.model_markers_m, np.zeros_like(scene.model_markers_m)

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.ground_wrench import move_moments
@@ -86,6 +85,8 @@ class Tone(Nameless):
         hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
         around = 2 * round(self.AROUND_HZ * count / scene.rate_hz) + 1
         height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
+        from scipy.signal import find_peaks  # heavy
+
         peaks, found = find_peaks(height, height=self.LINE)
         lines = hertz[peaks[np.argsort(-found["peak_heights"])][: self.MOST_LINES]]
         return lines[(lines > slowest) & (lines < fastest)]

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, resample, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
@@ -175,6 +174,8 @@ class Scene:
         padded = np.pad(self.measured, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
         slope = (padded[-1] - padded[0]) / (len(padded) - 1)
         level = padded - np.arange(len(padded))[:, None] * slope
+        from scipy.signal import resample  # heavy
+
         fine = resample(level, FINER * len(level), axis=0)
         fine += np.arange(len(fine))[:, None] * slope / FINER
         step = 1 / (FINER * self.rate_hz)
@@ -308,6 +309,8 @@ def without_fast(wrench: np.ndarray, stride: int) -> np.ndarray:
 
     Noise that turned up among the slow changes would make every shift in time seem smaller.
     """
+    from scipy.signal import butter, sosfiltfilt  # heavy
+
     sections = butter(4, SLOW_ENOUGH / stride, output="sos")
     slow = sosfiltfilt(sections, np.nan_to_num(wrench), axis=0)
     return np.where(np.isnan(wrench), np.nan, slow)

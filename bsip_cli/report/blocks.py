@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from bsip_cli.errors import printable
@@ -51,6 +51,14 @@ class Heading(Block):
 class Bullets(Block):
     items: tuple[str, ...]
     tone: Tone = "plain"
+
+
+def first_of(
+    lines: Sequence[str], most: int, where: str, tone: Tone = "plain"
+) -> tuple[Block, ...]:
+    """So many of the lines, and how many more there are where."""
+    more = (Paragraph(f"{len(lines) - most} more in {where}.", "note"),)
+    return Bullets(tuple(lines[:most]), tone), *(more if len(lines) > most else ())
 
 
 @dataclass(frozen=True)
@@ -232,8 +240,9 @@ _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render(document: Document) -> str:
-    """The page: figures as data, nothing from the network, no script at all; all texts escaped."""
+@cache
+def _template() -> Template:
+    """All texts in it are escaped."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -244,10 +253,13 @@ def render(document: Document) -> str:
     )
     environment.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
     environment.filters["tied"] = _tied
+    return environment.get_template("report.html.j2")
+
+
+def render(document: Document) -> str:
+    """The page: figures as data, nothing from the network, no script at all; all texts escaped."""
     style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
-    return environment.get_template("report.html.j2").render(
-        document=document, style=style, files=FILES
-    )
+    return _template().render(document=document, style=style, files=FILES)
 
 
 def words_in(blocks: Iterable[Block]) -> int:

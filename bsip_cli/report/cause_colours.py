@@ -3,7 +3,7 @@ distinguish."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bsip_cli.report.words import TEXTS
@@ -25,15 +25,18 @@ _CSS = {
 @dataclass(frozen=True)
 class Piece:
     """What some terms of the error budget, taken together where they look alike, make of an
-    error [%]."""
+    error [%]. ``perhaps``: of the unknown part, the faults that may make it but are no findings."""
 
     label: str
     share: float
     terms: tuple[str, ...]
+    perhaps: str = ""
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Keys of ``COLOURS``."""
+        if UNKNOWN in self.terms:  # whatever may make it
+            return (UNKNOWN,)
         return tuple(dict.fromkeys(term.partition(":")[0] for term in self.terms))
 
 
@@ -66,10 +69,3 @@ def fills(pieces: Iterable[Piece]) -> dict[str, Fill]:
             faults += 1
         found[piece.label] = Fill(tuple(COLOURS[kind] for kind in piece.kinds), hatch)
     return found
-
-
-def ordered(labels: Iterable[str], last: Sequence[str]) -> Iterator[str]:
-    """Each label once, those of ``last`` at the end."""
-    known = dict.fromkeys(labels)
-    yield from (one for one in known if one not in last)
-    yield from (one for one in last if one in known)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Scale
-from bsip_cli.report.cause_colours import Piece
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -200,7 +200,9 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = "Marks: good (Hansen 2017), large (Hicks 2015; markers: OpenSim)."
+SOURCES = (
+    "Good to the first mark (Hansen 2017), bad from the second (Hicks 2015; markers: OpenSim)."
+)
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
@@ -230,12 +232,15 @@ class Yardstick:
         """Without of what."""
         return self.unit.partition(" ")[0]
 
+    def is_large(self, value: float) -> bool:
+        return value > self.limit
+
     def words(self, value: float) -> str:
         if not np.isfinite(value):
             return "not known"
-        if value > self.limit:
-            return "large"
-        return "good" if value <= self.good else "ordinary"
+        if self.is_large(value):
+            return "bad: large"
+        return "good" if value <= self.good else "acceptable"
 
     def scale(self, value: float, other: Scale | None = None) -> Scale:
         """On a scale from nothing to a fixed multiple of the limit, in every report the same.
@@ -300,20 +305,19 @@ def _error(fit: pd.DataFrame) -> Mapping[str, float]:
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 BEFORE = "squared error before identification"  # RM's, of which the budget is
-REST = "all others"
-UNKNOWN = "unknown"
+REST = "small parts"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
-_UNSURE = "no finding of its own"
-_LAST = ("noise", UNKNOWN)
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _LEAST = 0.5  # less is nothing
+_MOST_LIKE = 2  # faults that a part is like
 LEAST_REPORTED_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
 def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tuple[Piece, ...]:
     """Of all trials together, the largest first; what is small together, then unknown and noise.
-    Their sum is 100. ``found``: the effects that a diagnosis reports."""
+    Their sum is 100. ``found``: the effects that a diagnosis reports; the share of a fault that is
+    no finding is unknown, as nobody can say that it is there."""
     whole = (budget["trial"] == "") & (budget["target"] == "")
     return _cut(budget[whole & (budget["component"] == component)].set_index("term"), found)
 
@@ -358,14 +362,13 @@ def numbered_pieces(
 
 
 def _with_remarks(piece: Piece, numbers: Sequence[int]) -> Piece:
-    """With the findings in its label, and with what a share below zero means."""
-    label = piece.label.removesuffix(f" ({_UNSURE})")
-    said = [_UNSURE] if label != piece.label else []
+    """With the findings in its label, what it may be, and what a share below zero means."""
+    said = [piece.perhaps] if piece.perhaps else []
     if numbers:
         is_fault = cause_colours.FAULT in piece.kinds
         said.append(f"{'' if is_fault else 'with '}{findings(numbers)}")
     said += ["cancels some"] if piece.share < 0 else []
-    return replace(piece, label=f"{label} ({'; '.join(said)})") if said else piece
+    return replace(piece, label=f"{piece.label} ({'; '.join(said)})") if said else piece
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
@@ -387,20 +390,38 @@ def _overall(
 
 def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     """What was found has its own piece, however small."""
-    large, last = [], []
+    large: list[Piece] = []
+    noise: list[Piece] = []
+    unknown: list[tuple[str, float]] = []
+    shares = {str(term): float(share) for term, share in rows["share_percent"].items()}
     for terms in _groups(rows):
-        label = _label(terms, found)
-        share = float(rows.loc[list(terms), "share_percent"].sum())
-        piece = Piece(label, share, terms)
-        least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
-        if label in _LAST:
-            last.append(piece)
-        elif piece.share >= least or piece.share <= -_WORTH:
+        faults = {term for term in terms if term.startswith(_FAULT)}
+        named = {term for term in faults if term.removeprefix(_FAULT) in found}
+        share = sum(shares[term] for term in terms)
+        if {*terms} <= faults - named | {UNKNOWN}:
+            unknown += [(term, shares[term]) for term in terms]
+            continue
+        piece = Piece(_label(terms, faults, named), share, terms)
+        if piece.label == NOISE:
+            noise.append(piece)
+        elif share >= (_LEAST if named else _WORTH) or share <= -_WORTH:
             large.append(piece)
     large.sort(key=lambda one: -one.share)
+    last = [*_unknown(unknown), *noise]
     others = 100.0 - sum(one.share for one in (*large, *last))
     rest = [Piece(REST, others, (cause_colours.REST,))] if abs(others) >= _LEAST else []
     return (*large, *rest, *last)
+
+
+def _unknown(parts: Sequence[tuple[str, float]]) -> Iterator[Piece]:
+    """The unknown with the terms and shares of faults that are no findings: the largest of these
+    may be what it is."""
+    if parts:
+        faults = {term: share for term, share in parts if term != UNKNOWN}
+        worth = sorted((-share, term) for term, share in faults.items() if share >= _WORTH)
+        like = [f"{-share:.0f} % like {term_words(term)}" for share, term in worth[:_MOST_LIKE]]
+        perhaps = ", ".join([*like, "not confirmed"]) if like else ""
+        yield Piece(UNKNOWN, sum(share for _, share in parts), (UNKNOWN, *faults), perhaps)
 
 
 def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
@@ -409,7 +430,7 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
     while left:
         group = [left[0]]
         for term in group:
-            alike = str(rows.loc[term, "alike"]).split(", ")
+            alike = dict.fromkeys(str(rows.loc[term, "alike"]).split(", "))  # each once
             group += [one for one in alike if one in left and one not in group]
         left = [term for term in left if term not in group]
         yield tuple(group)
@@ -422,11 +443,13 @@ def term_words(term: str) -> str:
     return str(TEXTS["terms"][term])
 
 
-def _label(terms: Sequence[str], found: Collection[str]) -> str:
-    """A fault that is no finding has only the share that it may have."""
-    faults = {term.removeprefix(_FAULT) for term in terms if term.startswith(_FAULT)}
-    unsure = f" ({_UNSURE})" if faults and not faults & {*found} else ""
-    return " or ".join(dict.fromkeys(map(term_words, terms))) + unsure
+def _label(terms: Sequence[str], faults: Collection[str], named: Collection[str]) -> str:
+    """Of faults that look alike only those that are findings; where none is, that they may be."""
+    unsure = {*faults} - {*named}
+    label = " or ".join(dict.fromkeys(term_words(one) for one in terms if one not in unsure))
+    if unsure and not named:
+        label += f", or perhaps {listing([*dict.fromkeys(map(term_words, sorted(unsure)))])}"
+    return label
 
 
 def size_of(budget: pd.DataFrame, component: str, trial: str = "") -> tuple[float, str]:
@@ -453,7 +476,7 @@ def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> s
     if total is None or not size >= LEAST_REPORTED_SIZE:
         return ""
     shares = pieces(budget, component, found)
-    parts = [f"{one.label} {number(one.share, 0)} %" for one in shares]
+    parts = [f"{_with_remarks(one, ()).label} {number(one.share, 0)} %" for one in shares]
     worth = ""
     if np.isfinite(total["gain_percent"]):
         change, low, high = (

@@ -20,11 +20,13 @@ from bsip_cli.report.recordings import (
     large_finding,
     largest_in,
     light_for,
+    main_part,
     measured_of,
     must_wait,
     names_of,
     number_of_main_part,
     numbered,
+    om_waits,
     use_lines,
     worst_of,
 )
@@ -48,34 +50,36 @@ _POSES = 8  # among which the one is chosen that is shown
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks; as many findings as there
     is room for."""
-    for most, named in _FINDINGS:
-        page = tuple(_in_order(record, most, named))
-        if blocks.words_in(page) <= _MOST_WORDS:
-            break
-    return *portrait(record), *page
-
-
-def _in_order(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
-    """``most``: findings in full; ``named``: kinds of findings of which only the name is given."""
     light = light_for(record)
     says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
-    yield from (
+    first = (
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
-        *_causes(record, most, named),
-        *_sizes(record),
-        *_sure(record, light),
-        blocks.Heading("What may be used?"),
-        blocks.Bullets(tuple(use_lines(record))),
-        blocks.Paragraph(
-            errors.use_sentence(
-                record.choice, record.identification, must_wait(record), is_known=True
-            )
-        ),
-        blocks.Heading("What to do next"),
-        blocks.Bullets(tuple(to_do(record, light, most))),
     )
+    then = (*_sizes(record), *_sure(record, light), *_use(record))
+    room = _MOST_WORDS - blocks.words_in((*first, *then))
+    for most, named in _FINDINGS:
+        causes, last = tuple(_causes(record, most, named)), tuple(_next(record, light, most))
+        if blocks.words_in((*causes, *last)) <= room:
+            break
+    return *portrait(record), *first, *causes, *then, *last
+
+
+def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
+    yield blocks.Heading("What may be used?")
+    yield blocks.Bullets(tuple(use_lines(record)))
+    known = record.choice, record.identification
+    yield blocks.Paragraph(errors.use_sentence(*known, must_wait(record), is_known=True))
+
+
+def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator[blocks.Block]:
+    """At most three things; all others are below."""
+    said = to_do(record, light, most)
+    yield blocks.Heading("What to do next")
+    yield blocks.Bullets(tuple(said[:_MOST_TO_DO]))
+    if len(said) > _MOST_TO_DO or len(_causes_shown(record, most)) < len(record.causes):
+        yield blocks.Links("", (("What to do, for all findings", f"#{verdict.ALL_FAULTS}"),))
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -153,7 +157,8 @@ def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
 
 
 def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
-    """A line per finding, the most important first; of those that have no room what they are."""
+    """A line per finding, the most important first; of those that have no room what they are.
+    ``most``: findings in full; ``named``: kinds of findings of which only the name is given."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
@@ -209,9 +214,10 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        known = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-        said.append(TEXTS["sure"]["known" if known else "unknown"])
-        unseen = unseen if known else ""
+        part, is_left = main_part(record)
+        known = "unknown" if part is None else "part" if is_left else "known"
+        said.append(TEXTS["sure"][known])
+        unseen = unseen if known == "known" else ""
     elif not record.causes:
         said.append("No fault is more probable than not.")
     said.append(unseen)
@@ -224,14 +230,18 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """The yardsticks by the parameters to use and by the table's, and what makes these errors."""
-    with_table = (one.scale(size) for one, size in measured_of(record, RM))
-    scales = [
-        one.scale(size, other if other.shown != one.scale(size).shown else None)
-        for (one, size), other in zip(measured_of(record), with_table, strict=True)
-    ]
-    used, later = record.use_words(), ", once usable" if must_wait(record) else ""
-    which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
+    """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
+    makes the errors of the table's."""
+    used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
+    which = f"? ● {used}, ○ {RM}" if used != RM else f" with {RM}?"
+    if om_waits(record):
+        first, other = other, first
+        which = f"? ● {RM}, ○ {used} (not to be used yet)"
+    scales = []
+    for (one, size), (_, beside) in zip(first, other, strict=True):
+        scale, next_to_it = one.scale(size), one.scale(beside)
+        is_other = scale.shown != next_to_it.shown
+        scales.append(replace(scale, other=next_to_it) if is_other else scale)
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(errors.SOURCES, "note")
@@ -245,18 +255,19 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
     if pieces := errors.numbered_pieces(record.budget, findings):
         use = record.use()
-        known = f"{errors.PARAMETERS} (OM corrects these)" if use == OM else errors.PARAMETERS
-        pieces = tuple(replace(p, label=p.label.replace(errors.PARAMETERS, known)) for p in pieces)
-        yield blocks.Bar(
-            f"What makes the {errors.BEFORE if use != RM else 'squared error'}:", pieces
-        )
+        if use == OM and not (om_waits(record) or beyond(record)):
+            known = f"{errors.PARAMETERS} (OM corrects these)"
+            labels = (p.label.replace(errors.PARAMETERS, known) for p in pieces)
+            pieces = tuple(replace(p, label=x) for p, x in zip(pieces, labels, strict=True))
+        before = " before identification" if use != RM else ""
+        yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 
 
 # --- what to do ---------------------------------------------------------------------------------
 
 
 def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str]:
-    """At most three things."""
+    """The most important first."""
     causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
     few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
@@ -279,7 +290,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
     if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
         text = rows["text"].iloc[0]
         said.append(f"Optional, to know the parameters better, record: {text}.")
-    return said[:_MOST_TO_DO]
+    return said
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:

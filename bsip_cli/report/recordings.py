@@ -4,13 +4,15 @@ still be used, and for what."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from bsip_cli.report import verdict
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
+from bsip_cli.report.cause_colours import Piece
 from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
 from bsip_cli.report.errors import (
     COP,
@@ -31,12 +33,14 @@ from bsip_cli.report.words import (
     task_of,
     trial_label,
 )
-from bsip_cli.statistics.methods import OM
+from bsip_cli.statistics.methods import OM, RM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
 _OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
+_USABLE = ("full", "care")  # as they are
 _MOST_REASONS = 4  # in a line
 _MOST_RUNS = 4  # of a task, in a line
+_once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 
 
 # --- how large ----------------------------------------------------------------------------------
@@ -54,6 +58,7 @@ def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yard
     return tuple((one, values[one.name]) for one in _yardsticks(record))
 
 
+@_once
 def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
     """The yardsticks beyond which the errors of all recordings together are."""
     return _large(measured_of(record))
@@ -84,6 +89,7 @@ def largest_in(record: ParticipantRecord, trial: TrialRecord) -> tuple[TrialReco
     return trial, max(own, key=lambda pair: np.nan_to_num(pair[1]) / pair[0].limit)[0]
 
 
+@_once
 def names_of(record: ParticipantRecord) -> dict[str, str]:
     """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
     tasks = [task_of(trial.stem) for trial in record.trials]
@@ -103,28 +109,32 @@ def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick
     """The yardsticks with a recording's own numbers, by the method to use."""
     fit = record.used_fit(trial)
     values = errors_of([] if fit is None else [fit])
-    markers = np.empty(0) if trial.kinematics is None else trial.kinematics["marker_rms_m"]
-    squares = np.asarray(markers, dtype=float) ** 2
-    squares = squares[np.isfinite(squares)]
-    values[MARKERS] = 1e3 * float(np.sqrt(squares.mean())) if len(squares) else np.nan
+    values[MARKERS] = trial.markers_mm()
     return tuple((one, values[one.name]) for one in _yardsticks(record))
 
 
 def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
-    return [(one, size) for one, size in sizes if one.words(size) == "large"]
+    return [(one, size) for one, size in sizes if one.is_large(size)]
 
 
 # --- the answer, and the finding that it is -------------------------------------------------------
 
 
+@_once
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
     large = [f"{one.short()} {number(size)} {one.unit}" for one, size in beyond(record)]
     alone = [names_of(record)[trial.stem] for trial in large_alone(record, with_markers=True)]
     tables = record.diagnosis, record.detection, record.budget
-    return verdict.light_of(*tables, large, record.use(), alone)
+    before = int(bool(large) and not is_said(record))  # `large_finding`
+    light = verdict.light_of(*tables, large, record.use(), alone, before)
+    if om_waits(record) and _large(measured_of(record, RM)):  # which is for now
+        title = light.title.replace("no large error", f"no large error with {OM}")
+        light = replace(light, title=title)
+    return light
 
 
+@_once
 def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     """The first finding where errors are large and the diagnosis has none that says so: how large,
     where most, whether the cause is known; else none."""
@@ -157,14 +167,21 @@ def is_said(record: ParticipantRecord) -> bool:
 def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells; nothing
     where the light says it."""
-    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    part, is_left = main_part(record)
     if part is None:
         if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
             return "other findings explain part at most"
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
-    if number_of := number_of_main_part(record):
-        return f"the largest part is finding {number_of}"
-    return "" if part.label in light_for(record).title else f"the largest part is {part.label}"
+    besides = " besides the table's parameters" if is_left else ""
+    if number_of := _number_of(record, part):
+        return f"the largest part{besides} is finding {number_of}"
+    in_title = part.label in light_for(record).title
+    return "" if in_title else f"the largest part{besides} is {part.label}"
+
+
+def main_part(record: ParticipantRecord) -> tuple[Piece | None, bool]:
+    """As `verdict.main_part`, of this person."""
+    return verdict.main_part(record.budget, effects_in(record.causes), record.use())
 
 
 def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
@@ -174,12 +191,14 @@ def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
 
 def number_of_main_part(record: ParticipantRecord) -> int:
     """Of the finding that makes the largest part of a large error of forces; 0 if none does."""
-    if all(one.name == MARKERS for one, _ in beyond(record)):
-        return 0
-    part = verdict.main_part(record.budget, effects_in(record.causes), record.use())
-    label = "" if part is None else part.label
-    numbered = enumerate(record.causes, start=1 if is_said(record) else 2)
-    return next((k for k, c in numbered if effect_title(c[0].effect) in label), 0)
+    part, is_left = main_part(record)
+    of_markers = all(one.name == MARKERS for one, _ in beyond(record))
+    return 0 if part is None or is_left or of_markers else _number_of(record, part)
+
+
+def _number_of(record: ParticipantRecord, part: Piece) -> int:
+    causes = enumerate(record.causes, start=1 if is_said(record) else 2)
+    return next((k for k, c in causes if effect_title(c[0].effect) in part.label), 0)
 
 
 # --- which recordings may be used ---------------------------------------------------------------
@@ -232,14 +251,23 @@ def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
 def must_wait(record: ParticipantRecord) -> str:
     """Why the parameters should not be used yet, and what to do: not all recordings that identified
     those to use may be used themselves, or errors are large and no recording may; else empty."""
-    uses, names = uses_of(record), names_of(record)
-    usable = {stem for stem, use in uses.items() if use.kind in ("full", "care")}
-    own = [t.stem for t in record.identification_trials() if t.stem not in usable]
-    if record.use() == OM and own:
-        return TEXTS["usable"]["identified"].format(trials=listing([names[stem] for stem in own]))
-    return TEXTS["usable"]["large"] if light_for(record).state == "large" and not usable else ""
+    if own := om_waits(record):
+        return TEXTS["usable"]["identified"].format(trials=listing(own))
+    usable = any(use.kind in _USABLE for use in uses_of(record).values())
+    is_large = light_for(record).state == "large"
+    return TEXTS["usable"]["large"] if is_large and not usable else ""
 
 
+@_once
+def om_waits(record: ParticipantRecord) -> list[str]:
+    """Names of the recordings for which OM, where that is to be used, has to wait."""
+    own = record.identification_trials() if record.use() == OM else ()
+    causes = dict(enumerate(record.causes))
+    kinds = {trial.stem: _use_of(record, trial, causes).kind for trial in own}
+    return [names_of(record)[stem] for stem, kind in kinds.items() if kind not in _USABLE]
+
+
+@_once
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     """Of each recording, by its stem, as far as its errors and the findings tell."""
     causes = numbered(record)

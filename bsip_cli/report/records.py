@@ -13,7 +13,7 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
-from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Terms
+from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Terms, first_of
 from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
 from bsip_cli.statistics.methods import MEASURED, RM, is_extended
@@ -60,6 +60,12 @@ class TrialRecord:
     @property
     def label(self) -> str:
         return trial_label(self.stem)
+
+    def markers_mm(self) -> float:
+        """Root mean square distance of the markers from the model; NaN where it is not known."""
+        frame = self.kinematics
+        rms = pd.Series(dtype=float) if frame is None else frame["marker_rms_m"].astype(float)
+        return 1e3 * float(np.sqrt((rms**2).mean()))  # of those that are known
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,17 +158,10 @@ def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
 
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
-    methods = sorted(reconstruction["method"].unique(), key=method_rank)
-    clock = clock_of(reconstruction)
-    signals = reconstruction[["method", "time_s", column]].groupby("method")
-    return {
-        name: signals.get_group(name)
-        .drop_duplicates("time_s")
-        .set_index("time_s")[column]
-        .reindex(clock)
-        .to_numpy()
-        for name in methods
-    }
+    once = reconstruction.drop_duplicates(["method", "time_s"])
+    wide = once.pivot(index="time_s", columns="method", values=column)
+    wide = wide.reindex(clock_of(reconstruction))
+    return {name: wide[name].to_numpy() for name in sorted(wide, key=method_rank)}
 
 
 def measured_of(reconstruction: pd.DataFrame) -> pd.DataFrame:
@@ -229,19 +228,13 @@ def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
         for stage, unit, text in made.messages
     ]
     blocks: list[Block] = [Heading("Warnings")]
-    if said:
-        blocks.append(Bullets(tuple(said[:_MOST_WARNINGS])))
-    if len(said) > _MOST_WARNINGS:
-        blocks.append(Paragraph(f"{len(said) - _MOST_WARNINGS} more in the artifacts.", "note"))
-    if not said:
-        blocks.append(Paragraph("No stage had anything to warn of."))
+    nothing = (Paragraph("No stage had anything to warn of."),)
+    blocks += first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
     shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
-    blocks.append(Heading("Options that differ from the shipped ones"))
-    if changed:
-        blocks.append(Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items()))))
-    else:
-        blocks.append(Paragraph("None."))
+    differ = Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items())))
+    blocks += [Heading("Options that differ from the shipped ones")]
+    blocks += [differ if changed else Paragraph("None.")]
     versions = (f"{name} {' / '.join(sorted(v))}" for name, v in sorted(made.versions.items()))
     blocks += [Heading("Versions"), Paragraph(", ".join(versions))]
     if made.files:

@@ -25,10 +25,9 @@ from bsip_cli.report.candidates import (
     limits_of,
     limits_sentence,
 )
-from bsip_cli.report.cause_colours import Piece
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
-    OBJECTS,
     WEIGHT,
     effect_title,
     separating_recording,
@@ -45,7 +44,6 @@ from bsip_cli.report.words import (
     segment_label,
     signed,
     trial_label,
-    with_article,
 )
 from bsip_cli.statistics.methods import OM, RM
 
@@ -96,7 +94,7 @@ def verdict_of(
     it is known. ``before``: findings of the report that come before those of the diagnosis."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = analysed(detection, diagnosis)
-    light = light_of(diagnosis, detection, budget)
+    light = light_of(diagnosis, detection, budget, before=len(before))
     names = [trial_label(stem) for stem in everywhere]
     return Verdict(
         f"{light.title}. {light.text}".rstrip(),
@@ -126,11 +124,12 @@ def light_of(
     large: Sequence[str] | None = None,
     use: str = RM,
     alone: Sequence[str] = (),
+    before: int = 0,
 ) -> Light:
     """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
     nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are with
     the method ``use``, None where that is not known; ``alone``: the recordings whose own errors
-    are; ``budget`` is of RM's."""
+    are; ``budget`` is of RM's; ``before``: findings of the report besides the diagnosis'."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
@@ -141,11 +140,10 @@ def light_of(
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].words.what)}.")
     looked = count(len(analysed(detection, diagnosis)), "recording")
     nothing = f"{capital(NONE_FOUND)} in {looked}."
-    found = _how_many(causes)
+    found = count(len(causes) + before, "finding")
     if large or any(is_large(cause) for cause in causes):
-        more = "also " if found and any(map(is_large, causes)) else ""
-        error = f"Large error{mostly(budget, effects_in(causes), use)}"
-        title = "; ".join(filter(None, (error, f"{more}{found}")))
+        title = f"Large error{mostly(budget, effects_in(causes), use)}"
+        title += f"; {found}" if len(causes) + before > 1 else ""  # one is the error itself
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
     no_large = f"no large error{f' except in {listing(alone)}' if alone else ''}"
@@ -155,42 +153,35 @@ def light_of(
     share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
     named = "" if np.isnan(share) else f"What was found makes {size} of the {errors.BEFORE}."
-    title = capital(found) if large is None else f"{capital(found)}; {no_large}"
+    if len({effect_title(one.effect) for cause in causes for one in cause}) == 1:
+        found += f": {effect_title(causes[0][0].effect)}"
+    title = found if large is None else f"{found}; {no_large}"
     return Light("cause", title, named or f"Searched: {looked}.")
-
-
-def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
-    """``2 faults and 1 error of unknown cause found; a club, racket or stick in the hand``; empty
-    where nothing but a large error was. What a task may be about is no fault."""
-    found = [cause for cause in causes if not is_large(cause)]
-    objects = [c for c in found if all(one.effect in OBJECTS for one in c)]
-    unnamed = [c for c in found if len(c) == 1 and c[0].effect == UNNAMED]
-    faults = len(found) - len(objects) - len(unnamed)
-    parts = [count(faults, "fault")] if faults else []
-    parts += [f"{count(len(unnamed), 'error')} of unknown cause"] if unnamed else []
-    named = dict.fromkeys(with_article(effect_title(one.effect)) for c in objects for one in c)
-    found_here = f"{listing(parts)} found" if parts else ""
-    return "; ".join(filter(None, (found_here, listing([*named], ""))))
 
 
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
     Errors with identified parameters are not the table's."""
-    most = main_part(budget, found, use)
-    if most is not None:
-        how = "most" if most.share > 50.0 else "the largest part"
-        return f", {how} of it {most.label} ({number(most.share, 0)} %)"
-    is_of_the_table = main_part(budget, found, RM) is not None
-    return " even with identified parameters" if is_of_the_table else f", {CAUSE_UNKNOWN}"
+    most, is_left = main_part(budget, found, use)
+    if is_left:
+        return " even with identified parameters"
+    if most is None:
+        return f", {CAUSE_UNKNOWN}"
+    how = "most" if most.share > 50.0 else "the largest part"
+    return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 
 
-def main_part(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> Piece | None:
-    """Of a large error with the method ``use``, what makes the largest part; None if unknown."""
+def main_part(
+    budget: pd.DataFrame | None, found: Collection[str], use: str = RM
+) -> tuple[Piece | None, bool]:
+    """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
+    that nothing is of unknown cause whose bar has no such part. And whether that is only what the
+    table's parameters leave, which OM should have taken away."""
     parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
-    most = max(parts, key=lambda one: one.share, default=None)
-    if most is None or most.label in (errors.UNKNOWN, errors.REST):
-        return None
-    return None if use == OM and errors.PARAMETERS in most.label else most
+    ranked = sorted(parts, key=lambda one: -one.share)
+    is_left = use == OM and bool(ranked) and errors.PARAMETERS in ranked[0].label
+    most = next(iter(ranked[is_left:]), None)
+    return (None if most is None or most.label in (UNKNOWN, NOISE) else most), is_left
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints: str = "") -> str:

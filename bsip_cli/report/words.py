@@ -24,10 +24,6 @@ _STEM = re.compile(
 )
 
 
-def with_article(noun: str) -> str:
-    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
-
-
 def number(value: float | None, digits: int = 1) -> str:
     """A number with fixed decimals and a true minus; a dash where there is none."""
     if value is None or not math.isfinite(value):

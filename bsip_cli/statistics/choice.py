@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, t
 
 from bsip_cli.statistics.methods import OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.samples import Intervals, effective_samples
@@ -82,6 +81,8 @@ def chosen(differences: Differences, is_rare: bool) -> str:
 
 def _widened(n: float) -> float:
     """By how much Student's t of n samples widens one standard error of a known spread."""
+    from scipy.stats import norm, t  # heavy
+
     return float(t.ppf(norm.cdf(1.0), n - 1)) if n > 1 else np.nan
 
 

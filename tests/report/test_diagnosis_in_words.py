@@ -59,7 +59,7 @@ def text_of(*tables) -> str:
 
 def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     text = text_of(found, detection(TRIALS))
-    assert text.startswith("2 faults found. Searched: 2 recordings.")
+    assert text.startswith("2 findings. Searched: 2 recordings.")
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
@@ -210,23 +210,21 @@ def test_a_large_error_is_one_plain_line_and_hides_faults(found):
         "sequence (run 1); large is 15.2 N and more."
     )
     both = pd.concat([large, found[found["rank"] > 1]])
-    assert (
-        light_of(both, detection(TRIALS)).title == "Large error, cause unknown; also 1 fault found"
-    )
+    assert light_of(both, detection(TRIALS)).title == "Large error, cause unknown; 2 findings"
 
 
-def test_an_object_of_the_task_is_no_fault(found):
+def test_a_single_finding_is_named(found):
     ball = found[found["rank"] == 1].assign(effect="released_object", class_id="", rank=9)
-    assert light_of(ball, detection(TRIALS)).title == "An object held and let go"
+    assert light_of(ball, detection(TRIALS)).title == "1 finding: object held and let go"
     both = pd.concat([found, ball])
-    assert light_of(both, detection(TRIALS)).title == "2 faults found; an object held and let go"
+    assert light_of(both, detection(TRIALS)).title == "3 findings"
 
 
 def test_something_that_cannot_be_named(found):
     row = found[found["effect"] == "plate_zero"].assign(
         effect=UNNAMED, verdict="named", class_id="", what="something goes along with fz"
     )
-    assert light_of(row, detection(TRIALS)).title == "1 error of unknown cause found"
+    assert light_of(row, detection(TRIALS)).title == "1 finding: error of unknown cause"
     text = text_of(row, detection(TRIALS))
     assert "Something goes along with fz (95 % interval 8.8 to 10.8 N)" in text
     assert EFFECT_WORDS[UNNAMED].follows.sentence in text
@@ -452,6 +450,7 @@ def test_the_one_bar_is_the_mean_over_what_is_asked_first():
         found = {one.label: one.share for one in overall_pieces(budget, ())}
         assert sum(found.values()) == pytest.approx(100.0)
         assert found["unknown"] == pytest.approx(20.0)
+        assert found["soft tissue or smoothing of the motion"] == pytest.approx(7.0)
     assert overall_pieces(table.assign(rms=0.1), ()) == ()
 
 
@@ -465,10 +464,11 @@ def test_what_was_found_has_its_own_piece_and_makes_as_much_as_it_says(share):
     pieces = {one.label: one.share for one in overall_pieces(fault, found)}
     assert pieces[title] == pytest.approx(share)
     assert found_share(fault, found) == pytest.approx(share)
-    others = {one.label for one in overall_pieces(fault, ())}
-    assert {label for label in others if title in label} == (
-        {f"{title} (no finding of its own)"} if share > 5 else set()
-    )
+    others = {one.label: one for one in overall_pieces(fault, ())}
+    assert not any(title in label for label in others)
+    assert others["unknown"].share == pytest.approx(20.0 + share)
+    like = f"{share:.0f} % like {title}, not confirmed" if share > 5 else ""
+    assert others["unknown"].perhaps == like and others["unknown"].kinds == ("unknown",)
     assert found_share(fault, {"sync_offset"}) == found_share(table, found) == 0.0
 
 

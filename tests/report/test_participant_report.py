@@ -132,16 +132,19 @@ def test_second_run_gives_the_same_bytes(reports):
 
 def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
-    assert "2 faults found; no large error" in first
+    assert "2 findings; no large error" in first
     assert (
         "Force plate turned or tilted: plate 1 is turned by +2.0 degrees (about the vertical: 95 % "
         "interval 1.75 to 2.26°), in both recordings, a usual size (1 to 4°); changes the left "
         "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "the errors? ● OM (basketball: RM), once usable, ○ RM" in first
-    assert "What makes the squared error before identification:" in first
-    assert "the table's segment parameters (OM corrects these) 70 %" in first
+    assert "the errors? ● RM, ○ OM (basketball: RM) (not to be used yet)" in first
+    assert (
+        "What makes the squared error of forces before identification (joint moments are another "
+        "scale):" in first
+    )
+    assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
     corrected = "sequence (finding 1); basketball (findings 1 and"
@@ -184,8 +187,9 @@ def test_a_page_without_room_has_fewer_findings(record, monkeypatch):
     monkeypatch.setattr("bsip_cli.report.first_page._MOST_WORDS", 200)
     page = front(record)
     (numbered,) = (block for block in page if isinstance(block, Numbered))
-    (links,) = (block for block in page if isinstance(block, Links))
+    links, all_of_them = (block for block in page if isinstance(block, Links))
     assert len(numbered.items) == 1 and links.rest.startswith(". 2: ")
+    assert all_of_them == page[-1] and "What to do" in all_of_them.to[0][0]
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
@@ -213,11 +217,9 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, most of it the table's segment parameters (70 %); also 1 fault found"
+        "Large error, most of it the table's segment parameters (70 %); 2 findings"
     )
-    assert (
-        light_of(beside, record.detection).title == "Large error, cause unknown; also 1 fault found"
-    )
+    assert light_of(beside, record.detection).title == "Large error, cause unknown; 2 findings"
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
     unsure = large.assign(effect="inconclusive", parameter="", what="too short")

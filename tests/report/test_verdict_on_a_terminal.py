@@ -21,7 +21,7 @@ def test_causes_are_numbered_and_lines_fit():
         assert max(map(len, text.splitlines())) <= min(columns, 100)
     assert "\n 1. Plate 1 is turned by +2.0 degrees" in text
     assert "\n 2. One of these, which these recordings cannot distinguish" in text
-    assert text.startswith("\n## Is anything wrong: sub-01\n2 faults found.")
+    assert text.startswith("\n## Is anything wrong: sub-01\n2 findings.")
 
 
 def test_what_was_put_right_is_told_too():
@@ -46,7 +46,7 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     Artifacts(tmp_path, person).write_all()
     text = "\n".join(shown(tmp_path))
     assert len(text.splitlines()) <= 24 and max(map(len, text.splitlines())) <= 100
-    assert text.startswith("sub-01: 2 faults found")
+    assert text.startswith("sub-01: 2 findings")
     flat = " ".join(text.split())
     assert " 1. Force plate turned or tilted: plate 1 is turned by +2.0 degrees" in flat
     assert "and OM (identified) for all other movements" in flat
@@ -76,6 +76,6 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
 
 def test_of_several_people_each_has_a_line(reports):
     text = "\n".join(shown(reports.out))
-    assert "sub-01: 2 faults found" in text and "sub-02: 2 faults found" in text
+    assert "sub-01: 2 findings" in text and "sub-02: 2 findings" in text
     assert "Plate 1 is turned" not in text
     assert text.rstrip().endswith("report: " + str(reports.out / "group" / "report.html"))

@@ -23,6 +23,7 @@ from bsip_cli.report.blocks import (
     Section,
     State,
     Terms,
+    first_of,
     picture,
 )
 from bsip_cli.report.cohort import laboratory
@@ -114,12 +115,9 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     yield from laboratory.first(record)
     missing = _missing(record)
     yield Heading("Who could not be used, and why")
-    if missing:
-        yield Bullets(tuple(missing[:_MOST]), "warning")
-        if len(missing) > _MOST:
-            yield Paragraph(f"{len(missing) - _MOST} more in the participants' reports.", "note")
-    else:
-        yield Paragraph("Nobody is missing.")
+    nobody = (Paragraph("Nobody is missing."),)
+    where = "the participants' reports"
+    yield from first_of(missing, _MOST, where, "warning") if missing else nobody
 
 
 def _yardsticks(record: CohortRecord) -> tuple[errors.Yardstick, ...]:
@@ -220,7 +218,7 @@ def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
         number(facts["mass_kg"], 2),
         signed(100.0 * (facts["plate_mass_kg"] / facts["mass_kg"] - 1.0), 1),
         number(facts["height_m"], 2),
-        *(Cell(number(v), "warning" if one.words(v) == "large" else "") for one, v in values),
+        *(Cell(number(v), "warning" if one.is_large(v) else "") for one, v in values),
         number(identified.get("duration_s")),
         significant(identified.get("condition_number")),
         refusals,

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -26,6 +27,7 @@ LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
 MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay small
 _MM = 1.0 / 25.4
+_DPI_OF_SVG = 72.0
 _FONTS = b"'DejaVu Sans', Verdana, Arial, sans-serif"  # of much the same width
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "bsip",
@@ -133,5 +135,15 @@ def to_svg(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
+        _lay_out(figure)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=200)
     return buffer.getvalue().replace(b"'DejaVu Sans'", _FONTS)
+
+
+def _lay_out(figure: Figure) -> None:
+    """Once; with a layout engine of its own, saving would draw all twice."""
+    FigureCanvasSVG(figure)
+    if engine := figure.get_layout_engine():
+        figure.set_dpi(_DPI_OF_SVG)
+        engine.execute(figure)
+        figure.set_layout_engine(None)

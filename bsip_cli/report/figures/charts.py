@@ -14,7 +14,8 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills, ordered
+from bsip_cli.report.blocks import Bar
+from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills
 from bsip_cli.report.figures import canvas
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.samples import Z95
@@ -25,16 +26,8 @@ _HEIGHT = 0.7  # of a bar, from one to the next
 _TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
-@dataclass(frozen=True)
-class Whole:
-    """An error in words, and pieces whose shares [%] add up to 100."""
-
-    label: str
-    pieces: tuple[Piece, ...]
-
-
 @canvas.house_style()
-def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
+def error_bars(bars: Sequence[Bar], first: Sequence[Piece] = ()) -> Figure:
     """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
     pieces whose order, and hatching of faults, are those of the first page's bar."""
     shown = {piece.label for bar in bars for piece in bar.pieces}
@@ -43,11 +36,13 @@ def error_bars(bars: Sequence[Whole], first: Sequence[Piece] = ()) -> Figure:
     fill = fills([*first, *(piece for bar in bars for piece in bar.pieces)])
     ends = np.zeros((len(bars), 2))  # left of zero, right of it
     handles: dict[str, Any] = {}
-    for label in (one for one in ordered(fill, (NOISE, UNKNOWN)) if one in shown):
+    last = (NOISE, UNKNOWN)
+    labels = (*(one for one in fill if one not in last), *last)
+    for label in (one for one in labels if one in shown):
         shares = [sum(p.share for p in bar.pieces if p.label == label) for bar in bars]
         handles[label] = _draw_shares(axes, np.array(shares), ends, fill[label])
     axes.axvline(0.0, color=canvas.INK, lw=0.9)
-    axes.set_yticks(range(len(bars)), [bar.label for bar in bars])
+    axes.set_yticks(range(len(bars)), [bar.title for bar in bars])
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
     canvas.tidy(axes, grid="x")

@@ -21,6 +21,7 @@ from bsip_cli.report.blocks import (
     Numbered,
     Paragraph,
     Section,
+    first_of,
     picture,
 )
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
@@ -106,8 +107,6 @@ def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
     compared = np.nan
     if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
         compared = float(records.flags_of(trial.reconstruction, "valid").mean())
-    rms = frame["marker_rms_m"].to_numpy(dtype=float)
-    rms = rms[np.isfinite(rms)]
     return (
         trial.label,
         role,
@@ -115,7 +114,7 @@ def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
         number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
         percent(compared),
         percent(float(frame["determined"].astype(float).mean())),
-        number(_MM * float(np.sqrt(np.mean(rms**2)))) if len(rms) else MISSING,
+        number(trial.markers_mm()),
     )
 
 
@@ -151,10 +150,7 @@ def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
         yield Paragraph("Nothing was repaired, excluded or warned of.")
         return
     yield Heading("Repaired, left out, warned of")
-    yield Bullets(tuple(lines[:_MOST_FINDINGS]))
-    if len(lines) > _MOST_FINDINGS:
-        more = count(len(lines) - _MOST_FINDINGS, "more finding")
-        yield Paragraph(f"{more} in the recordings' quality artifacts.", "note")
+    yield from first_of(lines, _MOST_FINDINGS, "the recordings' quality artifacts")
 
 
 # --- markers ------------------------------------------------------------------------------------
@@ -187,11 +183,7 @@ def _events(record: records.ParticipantRecord) -> Iterator[Block]:
     if known and not lines:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
     elif lines:
-        yield Bullets(tuple(lines[:_MOST_EVENTS]))
-        if len(lines) > _MOST_EVENTS:
-            yield Paragraph(
-                f"{len(lines) - _MOST_EVENTS} more in the trials' marker-events.", "note"
-            )
+        yield from first_of(lines, _MOST_EVENTS, "the trials' marker-events")
 
 
 # --- which segment parameters come out, how sure they are, and in which movements to use them -----
@@ -333,6 +325,7 @@ def diagnosis_section(record: records.ParticipantRecord) -> Section:
     blocks = (
         *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
         *(Paragraph(text) for text in (*verdict.corrected_sentence(events), *said.results)),
+        *([Heading("What to do"), Bullets(said.advice)] if said.advice else []),
         *nearest(candidates_of(record.diagnosis)),
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),

@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report import errors
-from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section, picture
+from bsip_cli.report.blocks import Bar, Block, Cell, Grid, Paragraph, Picture, Section, picture
 from bsip_cli.report.candidates import Candidate, effects_in
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
-from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
+from bsip_cli.report.figures.charts import Panel, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -98,7 +98,7 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
         if size >= errors.LEAST_REPORTED_SIZE:
             parts = errors.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
-            bars.append(Whole(name, parts))
+            bars.append(Bar(name, parts))
     if bars:
         figure = error_bars(bars, errors.overall_pieces(record.budget, found))
         yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])

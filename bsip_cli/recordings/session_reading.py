@@ -186,7 +186,7 @@ def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
     verdicts = {name: _verdict(hypotheses[0].fits[name], chosen, name) for name in chosen.of.fits}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
     if chosen.is_no_person and (found := _without_others_loads(trials, verdicts, limits)):
-        return replace(found, plates=found.plates | repeated)
+        return replace(found, plates={**found.plates, **repeated})
     return SessionReading(
         chosen.of.frame,
         verdicts | repeated,
@@ -211,7 +211,7 @@ def _without_others_loads(
     if any(one.refusal for one in found.plates.values()):
         return None
     log_posterior = found.log_posterior + _UNKNOWN
-    return replace(found, plates=found.plates | beside, log_posterior=log_posterior)
+    return replace(found, plates={**found.plates, **beside}, log_posterior=log_posterior)
 
 
 # --- the choice -------------------------------------------------------------------------------

@@ -233,10 +233,11 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
     used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
-    which = f"? ● {used}, ○ {RM}" if used != RM else f" with {RM}?"
+    later = " (not to be used yet)" if must_wait(record) else ""
+    which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if om_waits(record):
         first, other = other, first
-        which = f"? ● {RM}, ○ {used} (not to be used yet)"
+        which = f"? ● {RM}, ○ {used}{later}"
     scales = []
     for (one, size), (_, beside) in zip(first, other, strict=True):
         scale, next_to_it = one.scale(size), one.scale(beside)

@@ -258,8 +258,9 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         use = record.use()
         if use == OM and not (om_waits(record) or beyond(record)):
             known = f"{errors.PARAMETERS} (OM corrects these)"
-            labels = (p.label.replace(errors.PARAMETERS, known) for p in pieces)
-            pieces = tuple(replace(p, label=x) for p, x in zip(pieces, labels, strict=True))
+            pieces = tuple(
+                replace(one, label=one.label.replace(errors.PARAMETERS, known)) for one in pieces
+            )
         before = " before identification" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 

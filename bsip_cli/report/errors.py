@@ -242,9 +242,8 @@ class Yardstick:
             return "bad: large"
         return "good" if value <= self.good else "acceptable"
 
-    def scale(self, value: float, other: Scale | None = None) -> Scale:
-        """On a scale from nothing to a fixed multiple of the limit, in every report the same.
-        ``other``: what other parameters give."""
+    def scale(self, value: float) -> Scale:
+        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
         end = ENDS_AT * self.limit
         return Scale(
             self.title,
@@ -256,7 +255,6 @@ class Yardstick:
             f"{self.good:.2g}",
             number(self.limit, 0),
             bool(value > end),
-            other,
         )
 
 

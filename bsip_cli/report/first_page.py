@@ -233,10 +233,11 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
     used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
-    which = f"? ● {used}, ○ {RM}" if used != RM else f" with {RM}?"
+    later = " (not to be used yet)" if must_wait(record) else ""
+    which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if om_waits(record):
         first, other = other, first
-        which = f"? ● {RM}, ○ {used} (not to be used yet)"
+        which = f"? ● {RM}, ○ {used}{later}"
     scales = []
     for (one, size), (_, beside) in zip(first, other, strict=True):
         scale, next_to_it = one.scale(size), one.scale(beside)
@@ -257,8 +258,9 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         use = record.use()
         if use == OM and not (om_waits(record) or beyond(record)):
             known = f"{errors.PARAMETERS} (OM corrects these)"
-            labels = (p.label.replace(errors.PARAMETERS, known) for p in pieces)
-            pieces = tuple(replace(p, label=x) for p, x in zip(pieces, labels, strict=True))
+            pieces = tuple(
+                replace(one, label=one.label.replace(errors.PARAMETERS, known)) for one in pieces
+            )
         before = " before identification" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 

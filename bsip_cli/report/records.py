@@ -161,7 +161,7 @@ def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarra
     once = reconstruction.drop_duplicates(["method", "time_s"])
     wide = once.pivot(index="time_s", columns="method", values=column)
     wide = wide.reindex(clock_of(reconstruction))
-    return {name: wide[name].to_numpy() for name in sorted(wide, key=method_rank)}
+    return {name: wide[name].to_numpy() for name in sorted(map(str, wide), key=method_rank)}
 
 
 def measured_of(reconstruction: pd.DataFrame) -> pd.DataFrame:

@@ -75,11 +75,16 @@ class Feet:
         return replace(self, points_m=points)
 
     def all_on(self, outlines: Sequence[np.ndarray]) -> bool:
-        """Whether each marker on the ground is on a plate of one of these corners (4, 3)."""
+        """Whether both feet are seen and each of their markers on the ground is on a plate of one of
+        these corners (4, 3)."""
         on = np.isnan(self.points_m[..., 0])
         for corners_m in outlines:
             on = on | (_beyond(self.points_m, corners_m) <= _RIM_M).all(axis=-1)
-        return bool(outlines) and bool(on.all())
+        return self.both_seen and bool(outlines) and bool(on.all())
+
+    @property
+    def both_seen(self) -> bool:
+        return {"l", "r"} <= set(self.sides)
 
     def at(self, samples: np.ndarray) -> Feet:
         return replace(self, points_m=self.points_m[samples])
@@ -92,7 +97,7 @@ class Feet:
         """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;
         from that of the nearer foot where each stands ``apart`` (n,), on a plate of its own."""
         both = self._distance_m(places_m, [True] * len(self.sides))
-        if not {"l", "r"} <= set(self.sides):
+        if not self.both_seen:
             return both
         each = [self._distance_m(places_m, [one != other for one in self.sides]) for other in "lr"]
         nearer = np.fmin(*each)

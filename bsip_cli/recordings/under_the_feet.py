@@ -75,8 +75,8 @@ class Feet:
         return replace(self, points_m=points)
 
     def all_on(self, outlines: Sequence[np.ndarray]) -> bool:
-        """Whether both feet are seen and each of their markers on the ground is on a plate of one of
-        these corners (4, 3)."""
+        """Whether both feet are seen and each of their markers on the ground is on a plate of these
+        corners (4, 3)."""
         on = np.isnan(self.points_m[..., 0])
         for corners_m in outlines:
             on = on | (_beyond(self.points_m, corners_m) <= _RIM_M).all(axis=-1)

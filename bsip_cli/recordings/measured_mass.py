@@ -14,8 +14,8 @@ from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Interval
-from bsip_cli.recordings.written import FORCE_UNITS_N
-from bsip_cli.stated import BMI_KG_M2, USUAL_BMI_KG_M2, percent_apart
+from bsip_cli.recordings.written import FORCE_UNITS_N, force_unit
+from bsip_cli.stated import BMI_KG_M2, percent_apart
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
 # (makers' data sheets), 0.27 % between equator and poles for gravity.
@@ -35,6 +35,7 @@ _UNITS = (
     ("kilograms that were divided by 2.2046 once too often", 1 / 2.20462),
     ("kilograms that were divided by 9.81", 1 / 9.80665),
 )
+_LIKELY = 0.5  # a unit is named that is likelier than all else
 _IN_UNIT = "the forces are likely to be in another unit, {}: export them in N"
 _CM_PER_M = 100.0
 _NEAR_CM = 3.0
@@ -192,18 +193,10 @@ def _judged(
         reason = (
             f"the plates measure {measured.mass_kg:.1f} kg, a person{stature} has {low:.0f} to "
         )
-        reason += f"{high:.0f}{_likely_unit(measured.mass_kg, height_m)}"
+        unit = force_unit(measured.mass_kg, None, height_m, _PERCENT, _LIKELY)
+        reason += f"{high:.0f}" + (f"; {_IN_UNIT.format(unit)}" if unit else "")
         return replace(unknown(reason), of_nobody=True)
     return measured
-
-
-def _likely_unit(mass_kg: float, height_m: float | None) -> str:
-    """Of forces that were read in newton and so make a mass that nobody of this stature has."""
-    if height_m is None:
-        return ""
-    low, high = np.array(USUAL_BMI_KG_M2) * height_m**2
-    units = [name for name, newton in FORCE_UNITS_N.items() if low <= newton * mass_kg <= high]
-    return f"; {_IN_UNIT.format(units[0])}" if len(units) == 1 else ""
 
 
 def differing_plates(

@@ -242,5 +242,5 @@ def test_too_few_frames(swing):
     person, _, (_, q, _, _) = swing
     determined = np.zeros(len(q), dtype=bool)
     determined[:11] = True
-    with pytest.raises(BadDataError, match="11 frames"):
+    with pytest.raises(BadDataError, match="11 of 600 frames with a pose"):
         smoothed_where(person, q, determined)

@@ -211,14 +211,14 @@ def _swings(
     x'' = -2 damping pace x' - pace^2 x - ground, at rest when the trial begins; exact where the
     ground's acceleration is linear between samples.
     """
+    from scipy.signal import cont2discrete, lfilter  # heavy: reports never need it
+
     point = scene.centre(target)
     ground, pace = point.acceleration_m_s2, 2 * np.pi * frequency_hz
 
     def response(numerator: list[float]) -> np.ndarray:
         """(N, 3) travel of the mass against its segment [m], or with s^2 its acceleration."""
         system = (numerator, [1.0, 2 * damping * pace, pace**2])
-        from scipy.signal import cont2discrete, lfilter  # heavy
-
         b, a, _ = cont2discrete(system, 1 / scene.rate_hz, method="foh")
         return lfilter(np.ravel(b), a, ground - ground[0], axis=0)
 

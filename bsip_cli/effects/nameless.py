@@ -77,6 +77,8 @@ class Tone(Nameless):
 
         In a long trial a swing at one frequency would fall between the regular ones.
         """
+        from scipy.signal import find_peaks  # heavy: reports never need it
+
         residual = signal_of(scene, scene.measured - scene.predicted, channel)
         signal = np.where(scene.valid, np.nan_to_num(residual), 0.0)
         signal = np.where(scene.valid, signal - signal[scene.valid].mean(), 0.0)
@@ -85,8 +87,6 @@ class Tone(Nameless):
         hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
         around = 2 * round(self.AROUND_HZ * count / scene.rate_hz) + 1
         height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
-        from scipy.signal import find_peaks  # heavy
-
         peaks, found = find_peaks(height, height=self.LINE)
         lines = hertz[peaks[np.argsort(-found["peak_heights"])][: self.MOST_LINES]]
         return lines[(lines > slowest) & (lines < fastest)]

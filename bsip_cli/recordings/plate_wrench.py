@@ -49,7 +49,8 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
         return _zero_of(plate, pulled, rate_hz)
     width = max(1, round(_WINDOW_S * rate_hz))
     mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
-    heard = plate.usable & ~is_silent(plate.wrench())
+    # Shorter zeros are noise about a software's threshold, and part of what the plate reads.
+    heard = plate.usable & ~long_runs(is_silent(plate.wrench()), width)
     is_quiet = heard & (np.abs(mean - uniform_filter1d(mean, width)) < _QUIET_N)
     unloaded = is_quiet & (np.abs(mean) < _LARGEST_N)
     if surely_free is not None and (free := is_quiet & surely_free).any():

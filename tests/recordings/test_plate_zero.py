@@ -45,6 +45,17 @@ def test_zeros_that_software_wrote_are_no_reading():
     assert subtract_zero(plate, zero)[1].found.startswith("exactly 0 without load")
 
 
+def test_zeros_that_do_not_last_are_noise_about_a_threshold():
+    """Software sets to 0 what is below 9 N; the plate reads 12 N with noise of 5 N."""
+    plate = _plate(np.random.default_rng(5).normal(0, 5.0, 4000))
+    low = np.abs(plate.force_N[:, 2]) < 9
+    assert 0.15 < low.mean() < 0.5
+    force, moment = (np.where(low[:, None], 0.0, x) for x in (plate.force_N, plate.moment_Nm))
+    zero = plate_zero(replace(plate, force_N=force, moment_Nm=moment), RATE_HZ)
+    assert zero.n_samples > 3500
+    np.testing.assert_allclose(zero.offset[:3], OFFSET[:3], atol=2.5)
+
+
 def test_a_plate_that_is_never_unloaded_keeps_its_zero():
     plate = _plate(np.full(3000, 350.0))
     zero = plate_zero(plate, RATE_HZ)

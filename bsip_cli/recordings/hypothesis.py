@@ -27,7 +27,7 @@ from bsip_cli.recordings.plate_reading import (
 )
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.plates_of_files import ForceOnPoint
-from bsip_cli.recordings.trial_samples import TrialSamples, pace, paces
+from bsip_cli.recordings.trial_samples import ALIKE_M, TrialSamples, pace, paces
 from bsip_cli.recordings.under_the_feet import (
     Evidence,
     Feet,
@@ -39,9 +39,9 @@ from bsip_cli.recordings.under_the_feet import (
 
 AS_IT_IS = "taken as they stand"
 
-ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
-_ALIKE_SHARE = 0.01  # if their forces differ by less than this part of the load,
-_ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
+# Readings whose centres of pressure differ by less than `ALIKE_M` are one, if their forces differ
+# by less than this part of the load, and their vertical moments by less than this times it.
+_ALIKE_SHARE, _ALIKE_TORQUE_M = 0.01, 0.003
 _CLEARLY, _IN_19_OF_20 = 3.0, 1.96  # standard deviations
 _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 

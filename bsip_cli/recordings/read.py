@@ -52,6 +52,7 @@ _WITHOUT_PLACE = (
     "left the plate out",
     "excluded",
 )
+_DRIVES = "one that moves the body as the markers do"
 
 
 def read_recording(path: Path) -> Recording:
@@ -97,7 +98,8 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     if maybe and not surely:
         expected, action = "accelerations as large as forces make them", "took the stated rate"
         findings.append(Finding("rate", "cameras", f"perhaps {maybe}", expected, action, "warning"))
-    foreign = _other_trial(session.of_others.get(recording.path.stem, ""))
+    others = (one.get(recording.path.stem, "") for one in (session.of_others, session.twins))
+    foreign = _other_trial(*others)
     if note := recording.forces_note or foreign or surely:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
@@ -238,14 +240,15 @@ def _other_pace(times: float, rate_hz: float) -> str:
     )
 
 
-def _other_trial(name: str) -> str:
-    """Empty if there is none."""
-    words = (
+def _other_trial(name: str, twin: str) -> str:
+    """Empty if there is none; ``twin`` has the same forces."""
+    found = (
         "its forces do not last as long as its markers, and those of other trials of the session "
-        f"neither, but as long as each other's: here as the markers of {name}; give each force "
-        "table the name of its own trial"
+        f"neither, but as long as each other's: here as the markers of {name}"
     )
-    return words if name else ""
+    if twin:
+        found = f"its forces are those of {twin} too, where the markers move otherwise"
+    return f"{found}; give each trial its own force table" if name or twin else ""
 
 
 def _about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
@@ -253,7 +256,8 @@ def _about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
     expected, level = "one clock of markers and forces", "corrected"
     if own_s:
         found = delay_words(own_s)
-        action = "moved them by that; start markers and forces by one signal to know it better"
+        action = "moved them by that; start markers and forces by one signal to know it better, "
+        action += "and make sure that they are not those of another trial"
         return [Finding("delay", "forces", found, expected, action, level)]
     action = "none shows here, took the times as they stand; look whether the same delay is here "
     action, level = f"{action}too", "warning"
@@ -292,16 +296,19 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         is_moment = verdict.doubted == "vertical moment"
         found = f"its {verdict.doubted}: {' or '.join(verdict.alternatives)}: these trials do not "
         found += "show which"
-        expected = "one that moves the body as the markers do"
         action = "took it as it stands; a movement that "
         action += f"{'turns the body' if is_moment else 'pushes the body more'} would show it"
         check = "plate_moment" if is_moment else "plate_force"
-        findings.append(Finding(check, name, found, expected, action, "warning"))
+        findings.append(Finding(check, name, found, _DRIVES, action, "warning"))
     if words := reading.words():
         assert verdict.before is not None and verdict.after is not None
         before, after = _words(verdict.before), _words(verdict.after)
-        action = f"{words}: {after}" if after else f"{words}, as of the other plates"
-        findings.append(_about(name, before or "never loaded", action, "corrected"))
+        if before and before == after:
+            found = "as it stands, it does not drive the body as the markers move"
+            findings.append(Finding("plate_force", name, found, _DRIVES, words, "corrected"))
+        else:
+            action = f"{words}: {after}" if after else f"{words}, as of the other plates"
+            findings.append(_about(name, before or "never loaded", action, "corrected"))
     if reading.half_size_m is not None:
         sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
         found = "its load lies beside its outline and under a foot"

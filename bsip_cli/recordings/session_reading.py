@@ -26,7 +26,7 @@ from bsip_cli.recordings.plate_reading import (
     repeated_plates,
 )
 from bsip_cli.recordings.scene import Handedness, Stature
-from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, surest
+from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, of_twins, surest
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
 from bsip_cli.recordings.written import (
     AS_WRITTEN,
@@ -80,7 +80,8 @@ class SessionReading:
 
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
-    stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one.
+    stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one;
+    ``twins`` : where both have them.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
@@ -91,6 +92,7 @@ class SessionReading:
     paces: Mapping[str, float] = field(default_factory=dict)
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     of_others: Mapping[str, str] = field(default_factory=dict)
+    twins: Mapping[str, str] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
@@ -122,17 +124,19 @@ def reading_of_files(
     """
     surely = limits.corrected_percent / 100
     whose = of_other_trials([one.lengths for one in trials])
-    if of_others := {trials[k].name: trials[other].name for k, other in whose.items()}:
+    of_others = {trials[k].name: trials[other].name for k, other in whose.items()}
+    twins = of_twins(trials, limits)
+    if foreign := {*of_others, *twins}:
 
         def own(written: Written = AS_WRITTEN) -> list[TrialSamples]:
-            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": ()}
+            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "total_N": np.zeros(0)}
             return [
-                replace(one.without(one.sources), **nothing) if one.name in of_others else one
+                replace(one.without(one.sources), **nothing) if one.name in foreign else one
                 for one in read(written)
             ]
 
         found = reading_of_files(own(), own, stated_kg, stated_m, gross_percent, limits)
-        return replace(found, of_others=of_others)
+        return replace(found, of_others=of_others, twins=twins)
     written, masses = AS_WRITTEN, [one.mass_kg for one in trials if one.mass_kg]
     if masses:
         usual = Stature.of_all([one.stature for one in trials])

@@ -67,13 +67,24 @@ NO_DELAY = Delay()
 class Lags:
     """How well forces go with the body if they are taken from later, logarithm, (n,) each: as the
     file says; the force alone, turned or mirrored as suits it best; and the lift alone, which no
-    unit, reference point or order of corners changes. kept : see `Delay`."""
+    unit, reference point or order of corners changes. kept : see `Delay`. ``path_m`` : of the
+    centre of mass in each step."""
 
     seconds: np.ndarray
     kept: np.ndarray
     as_stated: np.ndarray
     of_force: np.ndarray
     of_lift: np.ndarray
+    path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def _now(self) -> np.ndarray:
+        """(3,) of each kind at the stated times, nearly."""
+        every = np.array([self.as_stated, self.of_force, self.of_lift])
+        return np.asarray(every[:, np.abs(self.seconds) <= LEAST_S].max(axis=1).clip(min=0.0))
+
+    def goes(self) -> float:
+        """How well forces go with the body at the stated times, in whatever axes and units."""
+        return float(self._now()[1])
 
     def delays(self, limits: GateLimits = USUAL) -> list[Delay]:
         """None, and all that are not surely others if any surely is better: who moves in cycles
@@ -83,8 +94,7 @@ class Lags:
         surely = -float(np.log(1 - limits.corrected_percent / 100))
         every = np.array([self.as_stated, self.of_force, self.of_lift])
         highest = every.max(axis=1)
-        nearly_none = every[:, np.abs(self.seconds) <= LEAST_S].max(axis=1).clip(min=0.0)
-        if not (highest > nearly_none + surely).any():
+        if not (highest > self._now() + surely).any():
             return [none]
         least = (highest - surely).clip(min=surely)[:, None]
         may_be, likelier = (every >= least).any(axis=0), every[:2].max(axis=0)
@@ -133,7 +143,8 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     most = min(round(_MOST_S * rate_hz / step), len(total))
     by = np.arange(-most, most + 1)
     found = [_goes(body, total, k, limits) for k in by.tolist()]
-    return Lags(by * step / rate_hz, *np.array(found).T)
+    kept, as_stated, of_force, of_lift = np.array(found).T
+    return Lags(by * step / rate_hz, kept, as_stated, of_force, of_lift, body.place_m)
 
 
 def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
@@ -203,7 +214,9 @@ def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
 _FEW = 100  # samples that each plate of a trial is seen by
 _LOADED = 0.05  # of the largest force: less is nobody
 _BLOCK_S = 0.02  # over which a total is averaged: filters leave it as it is
-_SAME = 0.999  # correlation of totals over equal times: nobody moves twice so alike
+_FEWEST = 50  # blocks: of 20 one, two strides of two people correlate by 0.984
+_SAME = 0.999  # correlation over equal times; of all public trials otherwise 0.988 at most
+ALIKE_M = 0.01  # centres of pressure, and paths of the body, that differ by less are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +226,8 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be. ``total_N`` : the plates' vertical force in each 20 ms.
+    another ``delay``, of each that may be. ``total_N`` : the plates' vertical force in each 20 ms,
+    and ``path_m`` of the centre of mass there, as far as known; how well both go is ``goes``.
     """
 
     name: str
@@ -231,6 +245,8 @@ class TrialSamples:
     delay: Delay = NO_DELAY
     late: tuple[TrialSamples, ...] = ()
     total_N: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    goes: float = 0.0
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
@@ -241,6 +257,8 @@ class TrialSamples:
         if found is None:
             return stated
         none, *others = found.delays(limits)
+        path_m = _in_blocks(found, len(stated.total_N))
+        stated = replace(stated, path_m=path_m, goes=found.goes())
         late = (
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others
@@ -319,19 +337,55 @@ def _mass_kg(opened: Opened) -> float:
 
 def same_movements(trials: Sequence[TrialSamples]) -> list[tuple[str, str]]:
     """Names of pairs that are one recording, exported twice: filtered, renamed, in two formats."""
-    return [
-        (one.name, other.name)
-        for one, other in combinations(trials, 2)
-        if _are_same(one.total_N, other.total_N)
-    ]
+    return [(one.name, other.name) for one, other in _same_forces(trials) if _alike(one, other)]
+
+
+def of_twins(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> dict[str, str]:
+    """Trials, by name, that have the forces of another one, which moves otherwise. They are of that
+    with which they surely go better; where that is not sure, of neither."""
+    surely = -float(np.log(1 - limits.corrected_percent / 100))
+    pairs = [pair for pair in _same_forces(trials) if not _alike(*pair)]
+    return {
+        own.name: twin.name
+        for pair in pairs
+        for own, twin in (pair, pair[::-1])
+        if own.goes < twin.goes + surely
+    }
+
+
+def _same_forces(trials: Sequence[TrialSamples]) -> list[tuple[TrialSamples, TrialSamples]]:
+    pairs = combinations(trials, 2)
+    return [(one, other) for one, other in pairs if _are_same(one.total_N, other.total_N)]
 
 
 def _are_same(one: np.ndarray, other: np.ndarray) -> bool:
     n = min(len(one), len(other))
-    if max(len(one), len(other)) > n + 1 or n < _FEW:
+    if max(len(one), len(other)) > n + 1 or n < _FEWEST:
         return False
     both = np.array([one[:n], other[:n]])
     return bool(both.std(axis=1).all() and abs(np.corrcoef(both)[0, 1]) > _SAME)
+
+
+def _alike(one: TrialSamples, other: TrialSamples) -> bool:
+    """Whether the centres of mass take one path, in axes that may be turned about the vertical;
+    or nothing shows that they do not."""
+    n = min(len(one.path_m), len(other.path_m))
+    paths = np.array([one.path_m[:n], other.path_m[:n]])
+    paths = paths[:, np.isfinite(paths).all(axis=(0, 2))]
+    if not paths.size:
+        return True
+    paths -= paths.mean(axis=1, keepdims=True)
+    across = paths[..., :2] @ [1.0, 1j]
+    turned = 2 * abs((across[0].conj() * across[1]).mean())
+    level = (np.abs(across) ** 2).mean(axis=1).sum() - turned
+    return bool(level + ((paths[0] - paths[1])[:, 2] ** 2).mean() < ALIKE_M**2)
+
+
+def _in_blocks(found: Lags, n: int) -> np.ndarray:
+    """The path of the centre of mass (n, 3) in the middle of each block of a total."""
+    times = _BLOCK_S * (0.5 + np.arange(n))
+    steps = (found.seconds[1] - found.seconds[0]) * np.arange(len(found.path_m))
+    return np.column_stack([np.interp(times, steps, one, right=np.nan) for one in found.path_m.T])
 
 
 def _total_N(opened: Opened) -> np.ndarray:

@@ -31,7 +31,7 @@ from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
-_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others")
+_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others", "twins")
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
 _NO_TEST = "what is found in one is no test of the other; remove one of them"
@@ -72,7 +72,10 @@ def run(unit: Unit) -> None:
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
     for first, again in same_movements(every):
-        unit.say(f"{again} shows the same movement as {first}: {_NO_TEST}")
+        unit.say(
+            f"{again} has the forces of {first} and moves alike: one recording exported twice, or "
+            f"one has the other's forces; {_NO_TEST}"
+        )
     unit.write("readings", rows, facts | written)
 
 

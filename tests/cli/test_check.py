@@ -61,7 +61,25 @@ def test_a_recording_under_two_names_is_said(bsip, study):
 def test_a_recording_exported_again_is_said(bsip, study):
     folder = study / "sub-01"
     (folder / "sub-01_task-steps.c3d").unlink()
-    assert "the same movement" not in bsip("check", study).err
+    assert "has the forces of" not in bsip("check", study).err
     _write_trc_mot(folder / "sub-01_task-squat_run-1.c3d", folder / "sub-01_task-filtered")
-    said = "sub-01_task-squat_run-1 shows the same movement as sub-01_task-filtered"
+    said = "sub-01_task-squat_run-1 has the forces of sub-01_task-filtered and moves alike"
     assert said in bsip("check", study).err
+
+
+def test_forces_of_another_trial_are_said(bsip, study):
+    """A squat played backwards with the forces of the one played forwards."""
+    folder = study / "sub-01"
+    (folder / "sub-01_task-steps.c3d").unlink()
+    _write_trc_mot(folder / "sub-01_task-squat_run-1.c3d", folder / "sub-01_task-squat_run-2")
+    trc = folder / "sub-01_task-squat_run-2.trc"
+    lines = trc.read_text().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("1\t"))
+    rows = [line.split("\t", 2) for line in lines[first:] if line]
+    backwards = [
+        "\t".join([*row[:2], other[2]]) for row, other in zip(rows, rows[::-1], strict=True)
+    ]
+    trc.write_text("\n".join([*lines[:first], *backwards]) + "\n")
+    answer = bsip("check", study)
+    assert "its forces are those of sub-01_task-squat_run-1 too" in answer.err
+    assert "50 Hz, 38 markers (hansen2017), no forces" in answer.out.splitlines()[2]

@@ -14,6 +14,7 @@ from bsip_cli.recordings.contacts import (
     plate_loads,
 )
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.momentum_mass import reach_m_s2
 from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
 
@@ -35,7 +36,8 @@ def _windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contact
     loads = plate_loads(recording, wrench_at_marker_rate(recording))
     rate_hz = recording.marker_rate_hz
     feet = foot_contacts({"l": left, "r": right}, rate_hz, loads, recording.n_frames)
-    return contact_windows(feet, trunk, mass_kg, rate_hz)
+    reach = reach_m_s2({"upper_torso": trunk}, rate_hz)
+    return contact_windows(feet, reach, mass_kg, rate_hz)
 
 
 @pytest.mark.parametrize(

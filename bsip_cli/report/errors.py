@@ -356,16 +356,12 @@ def numbered_pieces(
     }
     pieces = overall_pieces(budget, {one for effects in found.values() for one in effects})
     numbers = ([k for k, mine in terms.items() if mine & {*one.terms}] for one in pieces)
-    return tuple(map(_with_remarks, pieces, numbers))
+    return tuple(_with(one, findings(of)) for one, of in zip(pieces, numbers, strict=True))
 
 
-def _with_remarks(piece: Piece, numbers: Sequence[int]) -> Piece:
-    """With the findings in its label, what it may be, and what a share below zero means."""
-    said = [piece.perhaps] if piece.perhaps else []
-    if numbers:
-        is_fault = cause_colours.FAULT in piece.kinds
-        said.append(f"{'' if is_fault else 'with '}{findings(numbers)}")
-    said += ["cancels some"] if piece.share < 0 else []
+def _with(piece: Piece, remark: str) -> Piece:
+    """With a remark in its label, and what a share below zero means."""
+    said = [*filter(None, [remark, "cancels some" if piece.share < 0 else ""])]
     return replace(piece, label=f"{piece.label} ({'; '.join(said)})") if said else piece
 
 
@@ -474,7 +470,7 @@ def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> s
     if total is None or not size >= LEAST_REPORTED_SIZE:
         return ""
     shares = pieces(budget, component, found)
-    parts = [f"{_with_remarks(one, ()).label} {number(one.share, 0)} %" for one in shares]
+    parts = [f"{_with(one, one.perhaps).label} {number(one.share, 0)} %" for one in shares]
     worth = ""
     if np.isfinite(total["gain_percent"]):
         change, low, high = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from string import ascii_lowercase
 
 import numpy as np
@@ -29,6 +29,7 @@ from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     WEIGHT,
+    check_for,
     effect_title,
     separating_recording,
 )
@@ -397,7 +398,10 @@ def consequences(
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
-    known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
+    known = [EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS]
+    if len(cause) == 1 and cause[0].effect == UNNAMED:
+        check = check_for(cause[0].target, [size.name for size in cause[0].numbers])
+        known = [replace(known[0], action=check or known[0].action)]
     lab = (
         ((TEXTS["of_the_laboratory"], ""),)
         if all(one.scope == "laboratory" for one in cause)

@@ -14,7 +14,7 @@ from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.cohort import record as cohort
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.recordings import large_finding, light_for, must_wait
+from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
 from bsip_cli.report.records import (
     HowMade,
     Origin,
@@ -50,7 +50,12 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {"light": asdict(light), "large": large_finding(record), "first": must_wait(record)}
+    facts = {
+        "light": asdict(light),
+        "large": large_finding(record),
+        "first": must_wait(record),
+        "use": use_now(record),
+    }
     unit.write("report-files", rows, facts=facts)
 
 
@@ -167,9 +172,7 @@ def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
 
-    choices = {one.id: _read(unit, "choice", one) for one in unit.study.participants}
-    # the table's parameters where nothing was chosen
-    use = {name: str(rows["use"].iloc[0]) if len(rows) else RM for name, rows in choices.items()}
+    use = {one.id: _use(unit, one) for one in unit.study.participants}
     errors = cohort.yardsticks_of(read, use)
     return cohort.CohortRecord(
         members=tuple(
@@ -194,6 +197,16 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     """A participant's table; empty where there is none."""
     there = unit.path(kind, participant=participant).exists()
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
+
+
+def _use(unit: Unit, participant: Participant) -> str:
+    """As the person's own page says, or else as chosen; the table's where nothing was."""
+    if unit.path("report-files", participant=participant).exists():
+        facts = unit.facts("report-files", participant=participant)
+        if "use" in facts:
+            return str(facts["use"])
+    choice = _read(unit, "choice", participant)
+    return str(choice["use"].iloc[0]) if len(choice) else RM
 
 
 def _member(

@@ -12,7 +12,6 @@ import pandas as pd
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.cohort import record as cohort
-from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
 from bsip_cli.report.records import (
@@ -23,12 +22,10 @@ from bsip_cli.report.records import (
     TrialRecord,
     with_all_causes,
 )
-from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import load_words, person_of
-from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 
@@ -159,12 +156,17 @@ def origin_of(path: Path, label: str) -> Origin:
 
 
 def run_group(unit: Unit) -> None:
+    from bsip_cli.report.cohort.document import cohort_document  # heavy
+
     document = cohort_document(cohort_record_of(unit))
     unit.write("group-report-files", file_rows(unit.out, write_page(unit, document)))
 
 
 def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
     """Everything that is there of the whole study."""
+    from bsip_cli.report.tables.build import build_tables  # heavy
+    from bsip_cli.statistics.cohort import Criteria
+
     facts = unit.facts("values")
     criteria = Criteria(unit.config.stats.alpha, unit.config.stats.equivalence_percent)
     compared = unit.read("comparisons")
@@ -217,7 +219,7 @@ def _member(
         identified = identified[identified["method"] == OM]
     shown = {"person": _read(unit, "person", participant), "identification": identified}
     first = {
-        kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
+        kind: {name: rows[name].iloc[0] for name in cohort.SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()
     }
     has_page, was_searched = (

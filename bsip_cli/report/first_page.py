@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report import blocks, errors, verdict
+from bsip_cli.report import blocks, budget_words, errors, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
 from bsip_cli.report.error_shape import shape_of
@@ -264,12 +264,13 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
-    if pieces := errors.numbered_pieces(record.budget, findings):
+    if pieces := budget_words.numbered_pieces(record.budget, findings):
         use = record.use()
         if use == OM and not (om_waits(record) or beyond(record)):
-            known = f"{errors.PARAMETERS} (OM corrects these)"
+            known = f"{budget_words.PARAMETERS} (OM corrects these)"
             pieces = tuple(
-                replace(one, label=one.label.replace(errors.PARAMETERS, known)) for one in pieces
+                replace(one, label=one.label.replace(budget_words.PARAMETERS, known))
+                for one in pieces
             )
         before = " before identification" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
@@ -329,7 +330,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
     finding; where it is not known, when the error is largest and what to check first."""
     name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
     budget, of = record.budget, (trial.stem, _OF[error.name])
-    if budget is not None and (parts := errors.overall_pieces(budget, found, *of)):
+    if budget is not None and (parts := budget_words.overall_pieces(budget, found, *of)):
         main = max(parts, key=lambda one: one.share)
         if {term.partition(":")[2] for term in main.terms} & found:
             return ""

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.report import errors
+from bsip_cli.report import budget_words
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
@@ -102,7 +102,11 @@ def verdict_of(
         bool(causes),
         (*before, *(cause_text(cause, everywhere) for cause in causes)),
         (
-            *(errors.budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
+            *(
+                budget_words.budget_sentences(budget, effects_in(causes))
+                if budget is not None
+                else ()
+            ),
             *(_results(causes, gains, changes) if causes else ()),
             *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
@@ -151,9 +155,9 @@ def light_of(
     if not causes:
         title = "No fault found" if large is None else f"Fine: no fault found, {no_large}"
         return Light("fine", title, nothing)
-    share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
+    share = np.nan if budget is None else budget_words.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of the {errors.BEFORE}."
+    named = "" if np.isnan(share) else f"What was found makes {size} of the {budget_words.BEFORE}."
     if len({effect_title(one.effect) for cause in causes for one in cause}) == 1:
         found += f": {effect_title(causes[0][0].effect)}"
     title = found if large is None else f"{found}; {no_large}"
@@ -178,9 +182,9 @@ def main_part(
     """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
     that nothing is of unknown cause whose bar has no such part. And whether that is only what the
     table's parameters leave, which OM should have taken away."""
-    parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
+    parts = () if budget is None or budget.empty else budget_words.overall_pieces(budget, found)
     ranked = sorted(parts, key=lambda one: -one.share)
-    is_left = use == OM and bool(ranked) and errors.PARAMETERS in ranked[0].label
+    is_left = use == OM and bool(ranked) and budget_words.PARAMETERS in ranked[0].label
     most = next(iter(ranked[is_left:]), None)
     return (None if most is None or most.label in (UNKNOWN, NOISE) else most), is_left
 

@@ -8,6 +8,13 @@ from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.nameless import ALONG
 from bsip_cli.report.blocks import Paragraph
+from bsip_cli.report.budget_words import (
+    budget_sentences,
+    found_share,
+    numbered_pieces,
+    overall_pieces,
+    pieces,
+)
 from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
@@ -16,13 +23,6 @@ from bsip_cli.report.effect_words import (
     place_label,
     separating_recording,
     size_words,
-)
-from bsip_cli.report.errors import (
-    budget_sentences,
-    found_share,
-    numbered_pieces,
-    overall_pieces,
-    pieces,
 )
 from bsip_cli.report.participant.document import limit_blocks, nearest
 from bsip_cli.report.verdict import (

@@ -12,9 +12,10 @@ from bsip_cli.commands.show import shown
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.report.blocks import Links, Numbered, Scales
+from bsip_cli.report.budget_words import budget_sentences
 from bsip_cli.report.candidates import candidates_of, causes_of
 from bsip_cli.report.effect_words import effect_title
-from bsip_cli.report.errors import COP, FORCE, MARKERS, budget_sentences
+from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.first_page import budget_bar, front
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (

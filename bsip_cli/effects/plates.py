@@ -12,7 +12,6 @@ from itertools import permutations
 from types import MappingProxyType
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
@@ -413,6 +412,8 @@ def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
     would sharpen the forces, and so make up for what a smoothed motion lacks. And what the plates
     do wrong comes as late as their forces do.
     """
+    from scipy.interpolate import CubicSpline  # heavy
+
     effects = tuple(effects)
     late_s = joint_delay_s(scene, effects)
     of_the_plates, others = np.zeros((2, len(scene.times_s), 6))

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
@@ -28,6 +27,9 @@ from bsip_cli.motion.inverse_kinematics import (
     pose_responses,
     tree_of,
 )
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 FINER = 4  # samples per frame of the wrench between frames
 SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out
@@ -174,7 +176,8 @@ class Scene:
         padded = np.pad(self.measured, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
         slope = (padded[-1] - padded[0]) / (len(padded) - 1)
         level = padded - np.arange(len(padded))[:, None] * slope
-        from scipy.signal import resample  # heavy
+        from scipy.interpolate import CubicSpline  # heavy
+        from scipy.signal import resample
 
         fine = resample(level, FINER * len(level), axis=0)
         fine += np.arange(len(fine))[:, None] * slope / FINER

@@ -132,7 +132,23 @@ def usual_words(effect: str) -> str:
     return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
 
 
-# --- recordings that separate causes --------------------------------------------------------------
+# --- what to check, and to record, where a cause is unknown or one of several --------------------------------------------------------------
+
+
+def check_for(target: str, parameters: Sequence[str]) -> str:
+    """What tells more of an error of unknown cause: by the quantity that it goes along with, or the
+    fault that it acts like; empty where it is like none."""
+    channel, _, quantity = target.partition(" by ")
+    kind = "frequency" if "frequency" in parameters else quantity.partition("_")[0]
+    if check := _WORDS["checks"].get(kind):
+        return f"{check.format(channel=_WORDS['channels'].get(channel, 'forces'))}."
+    like = (name for name, usual in USUAL.items() if {*usual.parameters} & {*parameters})
+    if (name := next(like, None)) is None:
+        return ""
+    where = f" ({place})" if (place := place_label(name, target)) else ""
+    title, remedy = effect_title(name), EFFECTS[name].remedy
+    return f"{_WORDS['checks']['like'].format(title=title, place=where, remedy=remedy)}."
+
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
 _DISTINGUISHED_BY = {pair: one["record"] for one in _WORDS["distinguish"] for pair in one["causes"]}

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bsip_cli.report import blocks, errors, records, verdict
+from bsip_cli.report import blocks, budget_words, errors, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
+from bsip_cli.report.error_shape import shape_of
 from bsip_cli.report.participant.errors import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
@@ -31,8 +32,17 @@ from bsip_cli.report.recordings import (
     worst_of,
 )
 from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
-from bsip_cli.report.words import TEXTS, abbreviations, capital, count, in_a_row, listing, number
-from bsip_cli.statistics.methods import MEASURED, OM, RM
+from bsip_cli.report.words import (
+    TEXTS,
+    abbreviations,
+    capital,
+    component_label,
+    count,
+    in_a_row,
+    listing,
+    number,
+)
+from bsip_cli.statistics.methods import OM, RM
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -254,12 +264,13 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if record.budget is None:
         return
     findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
-    if pieces := errors.numbered_pieces(record.budget, findings):
+    if pieces := budget_words.numbered_pieces(record.budget, findings):
         use = record.use()
         if use == OM and not (om_waits(record) or beyond(record)):
-            known = f"{errors.PARAMETERS} (OM corrects these)"
+            known = f"{budget_words.PARAMETERS} (OM corrects these)"
             pieces = tuple(
-                replace(one, label=one.label.replace(errors.PARAMETERS, known)) for one in pieces
+                replace(one, label=one.label.replace(budget_words.PARAMETERS, known))
+                for one in pieces
             )
         before = " before identification" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
@@ -316,10 +327,10 @@ _SIGNALS = {errors.COP: ("cop_ap_m", "cop_ml_m"), errors.FORCE: ("fz_N",)}
 
 def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yardstick) -> str:
     """What makes the largest part of a recording's error and what helps; empty where that is a
-    finding; where it is not known, when the error is largest and what may be its cause."""
+    finding; where it is not known, when the error is largest and what to check first."""
     name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
     budget, of = record.budget, (trial.stem, _OF[error.name])
-    if budget is not None and (parts := errors.overall_pieces(budget, found, *of)):
+    if budget is not None and (parts := budget_words.overall_pieces(budget, found, *of)):
         main = max(parts, key=lambda one: one.share)
         if {term.partition(":")[2] for term in main.terms} & found:
             return ""
@@ -328,17 +339,10 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
             return texts["part"].format(
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
-    at = _largest_at(trial, record.use(trial.task), _SIGNALS[error.name])
-    when = "" if at is None else f" (error worst at {number(at, 2)} s)"
-    return texts["forces"].format(trial=name, when=when)
-
-
-def _largest_at(trial: TrialRecord, method: str, columns: Sequence[str]) -> float | None:
-    """When [s] the simulated signals are farthest from the measured ones; None if not known."""
-    table = trial.reconstruction
-    if table is None or method not in set(table["method"]):
-        return None
-    signals = [records.signals_of(table, column) for column in columns]
-    off = np.sum([(one[method] - one[MEASURED]) ** 2 for one in signals], axis=0)
-    off = np.where(records.flags_of(table, "valid") & np.isfinite(off), off, 0.0)
-    return float(records.clock_of(table)[np.argmax(off)]) if off.any() else None
+    shape = shape_of(trial.reconstruction, record.use(trial.task), _SIGNALS[error.name])
+    if shape is None:
+        return ""
+    when, check = texts["shapes"][shape.kind]
+    direction = component_label(shape.column.removesuffix("_m")).rpartition(", ")[2]
+    when = when.format(at=number(shape.worst_s, 2), direction=direction)
+    return texts["forces"].format(trial=name, error=error.brief, when=when, check=check)

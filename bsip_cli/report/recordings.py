@@ -267,6 +267,11 @@ def om_waits(record: ParticipantRecord) -> list[str]:
     return [names_of(record)[stem] for stem, kind in kinds.items() if kind not in _USABLE]
 
 
+def use_now(record: ParticipantRecord) -> str:
+    """The method whose parameters to use as long as OM has to wait, if it does."""
+    return RM if om_waits(record) else record.use()
+
+
 @_once
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     """Of each recording, by its stem, as far as its errors and the findings tell."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from string import ascii_lowercase
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.report import errors
+from bsip_cli.report import budget_words
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
@@ -29,6 +29,7 @@ from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Piece
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     WEIGHT,
+    check_for,
     effect_title,
     separating_recording,
 )
@@ -101,7 +102,11 @@ def verdict_of(
         bool(causes),
         (*before, *(cause_text(cause, everywhere) for cause in causes)),
         (
-            *(errors.budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
+            *(
+                budget_words.budget_sentences(budget, effects_in(causes))
+                if budget is not None
+                else ()
+            ),
             *(_results(causes, gains, changes) if causes else ()),
             *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
@@ -150,9 +155,9 @@ def light_of(
     if not causes:
         title = "No fault found" if large is None else f"Fine: no fault found, {no_large}"
         return Light("fine", title, nothing)
-    share = np.nan if budget is None else errors.found_share(budget, effects_in(causes))
+    share = np.nan if budget is None else budget_words.found_share(budget, effects_in(causes))
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of the {errors.BEFORE}."
+    named = "" if np.isnan(share) else f"What was found makes {size} of the {budget_words.BEFORE}."
     if len({effect_title(one.effect) for cause in causes for one in cause}) == 1:
         found += f": {effect_title(causes[0][0].effect)}"
     title = found if large is None else f"{found}; {no_large}"
@@ -177,9 +182,9 @@ def main_part(
     """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
     that nothing is of unknown cause whose bar has no such part. And whether that is only what the
     table's parameters leave, which OM should have taken away."""
-    parts = () if budget is None or budget.empty else errors.overall_pieces(budget, found)
+    parts = () if budget is None or budget.empty else budget_words.overall_pieces(budget, found)
     ranked = sorted(parts, key=lambda one: -one.share)
-    is_left = use == OM and bool(ranked) and errors.PARAMETERS in ranked[0].label
+    is_left = use == OM and bool(ranked) and budget_words.PARAMETERS in ranked[0].label
     most = next(iter(ranked[is_left:]), None)
     return (None if most is None or most.label in (UNKNOWN, NOISE) else most), is_left
 
@@ -397,7 +402,10 @@ def consequences(
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
-    known = (EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS)
+    known = [EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS]
+    if len(cause) == 1 and cause[0].effect == UNNAMED:
+        check = check_for(cause[0].target, [size.name for size in cause[0].numbers])
+        known = [replace(known[0], action=check or known[0].action)]
     lab = (
         ((TEXTS["of_the_laboratory"], ""),)
         if all(one.scope == "laboratory" for one in cause)

@@ -22,8 +22,8 @@ from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
 from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
+from bsip_cli.report.budget_words import term_words
 from bsip_cli.report.candidates import candidates_of, causes_of
-from bsip_cli.report.errors import term_words
 from bsip_cli.report.verdict import cause_line, verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record, detection_rows, facts_of, rows_of

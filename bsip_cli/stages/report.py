@@ -12,9 +12,8 @@ import pandas as pd
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.cohort import record as cohort
-from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.recordings import large_finding, light_for, must_wait
+from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
 from bsip_cli.report.records import (
     HowMade,
     Origin,
@@ -23,12 +22,10 @@ from bsip_cli.report.records import (
     TrialRecord,
     with_all_causes,
 )
-from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import load_words, person_of
-from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 
@@ -50,7 +47,12 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {"light": asdict(light), "large": large_finding(record), "first": must_wait(record)}
+    facts = {
+        "light": asdict(light),
+        "large": large_finding(record),
+        "first": must_wait(record),
+        "use": use_now(record),
+    }
     unit.write("report-files", rows, facts=facts)
 
 
@@ -154,12 +156,17 @@ def origin_of(path: Path, label: str) -> Origin:
 
 
 def run_group(unit: Unit) -> None:
+    from bsip_cli.report.cohort.document import cohort_document  # heavy
+
     document = cohort_document(cohort_record_of(unit))
     unit.write("group-report-files", file_rows(unit.out, write_page(unit, document)))
 
 
 def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
     """Everything that is there of the whole study."""
+    from bsip_cli.report.tables.build import build_tables  # heavy
+    from bsip_cli.statistics.cohort import Criteria
+
     facts = unit.facts("values")
     criteria = Criteria(unit.config.stats.alpha, unit.config.stats.equivalence_percent)
     compared = unit.read("comparisons")
@@ -167,9 +174,7 @@ def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
 
-    choices = {one.id: _read(unit, "choice", one) for one in unit.study.participants}
-    # the table's parameters where nothing was chosen
-    use = {name: str(rows["use"].iloc[0]) if len(rows) else RM for name, rows in choices.items()}
+    use = {one.id: _use(unit, one) for one in unit.study.participants}
     errors = cohort.yardsticks_of(read, use)
     return cohort.CohortRecord(
         members=tuple(
@@ -196,6 +201,16 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
+def _use(unit: Unit, participant: Participant) -> str:
+    """As the person's own page says, or else as chosen; the table's where nothing was."""
+    if unit.path("report-files", participant=participant).exists():
+        facts = unit.facts("report-files", participant=participant)
+        if "use" in facts:
+            return str(facts["use"])
+    choice = _read(unit, "choice", participant)
+    return str(choice["use"].iloc[0]) if len(choice) else RM
+
+
 def _member(
     unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]
 ) -> cohort.Member:
@@ -204,7 +219,7 @@ def _member(
         identified = identified[identified["method"] == OM]
     shown = {"person": _read(unit, "person", participant), "identification": identified}
     first = {
-        kind: {name: rows[name].iloc[0] for name in SHOWN[kind]} if len(rows) else None
+        kind: {name: rows[name].iloc[0] for name in cohort.SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()
     }
     has_page, was_searched = (

@@ -5,8 +5,9 @@ import pytest
 
 from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Bar, Document, Scales, render
+from bsip_cli.report.budget_words import overall_pieces
 from bsip_cli.report.cause_colours import COLOURS, FAULT, Piece, fills
-from bsip_cli.report.errors import overall_pieces, yardsticks
+from bsip_cli.report.errors import yardsticks
 from bsip_cli.report.words import abbreviations
 from tests.report.fake_study import error_budget
 

@@ -6,21 +6,23 @@ import pytest
 
 from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.nameless import ALONG
 from bsip_cli.report.blocks import Paragraph
-from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
-from bsip_cli.report.effect_words import (
-    EFFECT_WORDS,
-    USUAL,
-    place_label,
-    separating_recording,
-    size_words,
-)
-from bsip_cli.report.errors import (
+from bsip_cli.report.budget_words import (
     budget_sentences,
     found_share,
     numbered_pieces,
     overall_pieces,
     pieces,
+)
+from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
+from bsip_cli.report.effect_words import (
+    EFFECT_WORDS,
+    USUAL,
+    check_for,
+    place_label,
+    separating_recording,
+    size_words,
 )
 from bsip_cli.report.participant.document import limit_blocks, nearest
 from bsip_cli.report.verdict import (
@@ -227,7 +229,10 @@ def test_something_that_cannot_be_named(found):
     assert light_of(row, detection(TRIALS)).title == "1 finding: error of unknown cause"
     text = text_of(row, detection(TRIALS))
     assert "Something goes along with fz (95 % interval 8.8 to 10.8 N)" in text
-    assert EFFECT_WORDS[UNNAMED].follows.sentence in text
+    check = (
+        "It acts like constant offset of a plate's channel (plate 1, vertical force); to check, "
+    )
+    assert f"{EFFECT_WORDS[UNNAMED].follows.meaning} {check}step off the plate" in text
     assert "bsip extend" not in text  # what has no name cannot be put into a model
 
 
@@ -328,7 +333,21 @@ def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
     )  # fmt: skip
     text = text_of(uneven, detection(TRIALS))
     assert "Of unknown cause: plate 1 is turned, but not evenly (95 %" in text
-    assert EFFECT_WORDS[UNNAMED].follows.sentence in text
+    assert "It acts like force plate turned or tilted (plate 1); to check, push forwards" in text
+
+
+def test_what_an_error_of_unknown_cause_asks_to_check():
+    """By what it goes along with, and in which component."""
+    assert check_for("fz by load", ["error"]) == (
+        "Lay two known weights on each plate in turn, and compare its vertical force with theirs."
+    )
+    assert "several places of each plate" in check_for("fx by pelvis_y", ["error"])
+    assert check_for("all by time", ["error"]).endswith("and compare their forces.")
+    assert "empty plates for ten seconds" in check_for("mz", ["amplitude", "frequency"])
+    assert "hop three times in view" in check_for("", ["delay"])
+    assert check_for("fx", ["nothing known"]) == ""
+    channels = ("all", "fx", "fy", "fz", "mx", "my", "mz")
+    assert all(check_for(f"{one} by {what}", ["error"]) for one in channels for what in ALONG)
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -480,6 +499,6 @@ def test_parts_of_the_bar_have_the_numbers_of_their_findings():
     labels = [one.label for one in numbered_pieces(table.assign(share_percent=shares), found)]
     gain = EFFECT_WORDS["plate_gain"].title
     assert f"{gain} (findings 2 and 3)" in labels
-    assert "soft tissue (with finding 5)" in labels  # which has what is usual too
+    assert "soft tissue (finding 5)" in labels  # which has what is usual too
     assert "smoothing of the motion (cancels some)" in labels
     assert "the table's segment parameters" in labels

@@ -59,12 +59,6 @@ from bsip_cli.report.words import (
 )
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
-SHOWN = {
-    "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
-    "identification": ("duration_s", "condition_number"),
-}
-"""Columns of a participant's artifacts that are shown."""
-
 _KEPT = ("n", "p")  # columns of the tables, next to means
 _MOST = 6  # sentences of a kind on the first page
 _FAR = 3.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -14,12 +14,20 @@ from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
-from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, TEXTS, capital, listing, number, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
+if TYPE_CHECKING:
+    from bsip_cli.report.tables.model import Table
+
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
+
+SHOWN = {
+    "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
+    "identification": ("duration_s", "condition_number"),
+}
+"""Columns of a participant's artifacts that are shown."""
 
 ReadValues = Callable[[str, str], pd.DataFrame]  # table and variable to their rows of ``values``
 

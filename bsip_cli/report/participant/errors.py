@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report import errors
+from bsip_cli.report import budget_words, errors
 from bsip_cli.report.blocks import Bar, Block, Cell, Grid, Paragraph, Picture, Section, picture
 from bsip_cli.report.candidates import Candidate, effects_in
 from bsip_cli.report.effect_words import effect_title
@@ -94,13 +94,13 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     found = effects_in(record.causes)
     bars = []
     for component in COMPONENTS:
-        size, unit = errors.size_of(record.budget, component)
-        if size >= errors.LEAST_REPORTED_SIZE:
-            parts = errors.pieces(record.budget, component, found)
+        size, unit = budget_words.size_of(record.budget, component)
+        if size >= budget_words.LEAST_REPORTED_SIZE:
+            parts = budget_words.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
             bars.append(Bar(name, parts))
     if bars:
-        figure = error_bars(bars, errors.overall_pieces(record.budget, found))
+        figure = error_bars(bars, budget_words.overall_pieces(record.budget, found))
         yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])
 
 

@@ -18,7 +18,6 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.contacts import low_pass
 from bsip_cli.recordings.momentum_mass import NEIGHBOUR, shares_of_seen
 from bsip_cli.segments import without_side
 
@@ -82,7 +81,9 @@ class Body:
     @classmethod
     def of(cls, markers_m: Mapping[str, np.ndarray], rate_hz: float, frames: np.ndarray) -> Body:
         """From a trial's markers (n_frames, k, 3) per segment, world frame, at some frames (n,)."""
-        paths, weights = _seen(markers_m)
+        paths = {name: _paths(markers) for name, markers in markers_m.items()}
+        paths = {name: path for name, path in paths.items() if path.shape[1]}
+        weights = shares_of_seen(list(paths))
         mass = sum(weights.values())
         n_frames = max((len(path) for path in paths.values()), default=0)
         if mass < _MOST_OF_IT or n_frames < _FEWEST_FRAMES:
@@ -316,28 +317,6 @@ def turn_of_forces(
         left = [float(np.mean(np.abs(turn * a - b) ** 2)) for a, b, _ in groups]
         weights = [2.0 / max(one, floor) for one, floor in zip(left, least, strict=True)]
     return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total)))
-
-
-def reach_m_s2(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> np.ndarray | None:
-    """(n,) what bears the body whose markers (n, k, 3) are given per segment: gravity and the
-    vertical acceleration of its centre of mass, low-passed; None without a marker on the trunk."""
-    paths, weights = _seen(markers_m)
-    n_frames = max((len(path) for path in paths.values()), default=0)
-    if n_frames < _FEWEST_FRAMES or not {"lower_torso", "upper_torso"} & paths.keys():
-        return None
-    paths = _about_centres({name: paths[name] for name in weights})
-    height = sum(w * paths[name][..., 2].mean(axis=1) for name, w in weights.items())
-    velocity = np.gradient(low_pass(height / sum(weights.values()), rate_hz)) * rate_hz
-    return np.asarray(GRAVITY_M_S2 + np.gradient(velocity) * rate_hz)
-
-
-def _seen(
-    markers_m: Mapping[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], dict[str, float]]:
-    """Paths of the segments whose markers are seen, and their shares of the body's mass."""
-    paths = {name: _paths(markers) for name, markers in markers_m.items()}
-    paths = {name: path for name, path in paths.items() if path.shape[1]}
-    return paths, shares_of_seen(list(paths))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

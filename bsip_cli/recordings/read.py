@@ -13,11 +13,10 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.body_motion import reach_m_s2
 from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
+from bsip_cli.recordings.momentum_mass import Interval, intervals_alone, reach_m_s2
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
 from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.plates import LOADED_N

@@ -10,7 +10,6 @@ import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.body_motion import reach_m_s2
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
     ContactWindows,
@@ -29,6 +28,7 @@ from bsip_cli.recordings.momentum_mass import (
     Interval,
     intervals_alone,
     intervals_of,
+    reach_m_s2,
     upright_frames,
 )
 from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate

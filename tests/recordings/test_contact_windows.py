@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
-from bsip_cli.recordings.body_motion import reach_m_s2
 from bsip_cli.recordings.contacts import PlateLoad, contact_windows, foot_contacts
+from bsip_cli.recordings.momentum_mass import reach_m_s2
 
 RATE_HZ = 100.0
 N = 300

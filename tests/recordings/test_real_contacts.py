@@ -7,18 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.recordings.body_motion import reach_m_s2
 from bsip_cli.recordings.contacts import (
     ContactWindows,
-    agreeing_mass,
     contact_windows,
     foot_contacts,
     plate_loads,
 )
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.momentum_mass import reach_m_s2
 from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.scene import by_segment
 
 pytestmark = pytest.mark.real
 
@@ -81,17 +79,3 @@ def test_unloaded_belt_has_its_offset(real_data):
     loaded, unloaded = (plate_zero(p, recording.analog_rate_hz) for p in recording.plates)
     assert not loaded.is_known()
     assert unloaded.offset[2] == pytest.approx(9.0, abs=0.2)
-
-
-def test_steps_of_a_sprinter_carry_the_whole_body(real_data):
-    """Four steps on plates, one before them; by the trunk alone the mass came to 141 kg."""
-    recording = read_recording(real_data / "sprinter_ja1/JA1Gait35.c3d")
-    markers, rate_hz = by_segment(recording.labels, recording.markers_m), recording.marker_rate_hz
-    loads = plate_loads(recording, wrench_at_marker_rate(recording))
-    own = {side: markers[f"foot_{side}"] for side in "lr"}
-    feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
-    reach = reach_m_s2(markers, rate_hz)
-    mass = agreeing_mass(feet.total_N, reach, feet.measured, rate_hz)
-    assert 70 < mass < 88
-    valid = contact_windows(feet, reach, mass, rate_hz).valid
-    assert valid[70:].mean() > 0.95 and not valid[30:50].any()

@@ -36,7 +36,7 @@ _MISMATCH_SHARE = 0.35  # of body weight, and of the force's own departure from 
 _MISMATCH_S = 0.1
 _BLINK_S = 0.06  # shorter touches without load are no touch
 _LEAST_WINDOW_S = 0.1
-_CUTOFF_HZ = 6.0
+_TRUNK_CUTOFF_HZ = 6.0
 _SAID = 2, 6  # of times: digits, and so many at most
 
 
@@ -133,18 +133,17 @@ def foot_contacts(
 
 def contact_windows(
     feet: FootContacts,
-    reach_m_s2: np.ndarray | None,
+    trunk_markers_m: np.ndarray,
     mass_kg: float | None,
     rate_hz: float,
     stands_kg: float | None = None,
 ) -> ContactWindows:
     """Frames in which the plates measure all that touches the person.
 
-    ``reach_m_s2`` (n_frames,) is what bears ``mass_kg``: gravity and the vertical acceleration of
-    the centre of mass; None where markers do not show it. Where the mass is None, no frame can be
-    shown to be free of other contacts, and none is valid. ``stands_kg`` is what the plates read of
-    the person standing still: where that is less, the forces or the mass are wrong alike in all
-    frames, and nothing else bears the person.
+    ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
+    None, no frame can be shown to be free of other contacts, and none is valid. ``stands_kg`` is
+    what the plates read of the person standing still: where that is less, the forces or the mass
+    are wrong alike in all frames, and nothing else bears the person.
     """
     reasons = feet.reasons
     if not feet.usable.any() or mass_kg is None:
@@ -153,8 +152,8 @@ def contact_windows(
         nothing = np.zeros(len(feet.measured), bool)
         return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
     mismatch, balance = np.zeros_like(feet.measured), None
-    if reach_m_s2 is not None:
-        balance = low_pass(feet.total_N, rate_hz), mass_kg * reach_m_s2  # measured, needed
+    if (reach := reach_m_s2(trunk_markers_m, rate_hz)) is not None:
+        balance = low_pass(feet.total_N, rate_hz), mass_kg * reach  # measured, needed
         mismatch = _mismatch(*balance, mass_kg * GRAVITY_M_S2, rate_hz)
     shortest = round(_LEAST_WINDOW_S * rate_hz)
     valid = long_runs(feet.measured & ~mismatch, shortest)
@@ -258,7 +257,7 @@ def _finding(subject: str, found: str) -> Finding:
 def _mismatch(
     measured_N: np.ndarray, needed_N: np.ndarray, weight_N: float, rate_hz: float
 ) -> np.ndarray:
-    """Frames in which the body's motion needs another vertical force than measured."""
+    """Frames in which the trunk's motion needs another vertical force than measured."""
     allowed = _MISMATCH_SHARE * (weight_N + np.abs(needed_N - weight_N))
     different = np.abs(measured_N - needed_N) > allowed
     return long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
@@ -274,27 +273,38 @@ def _is_borne(balance: tuple[np.ndarray, np.ndarray], frames: np.ndarray, share:
 
 def agreeing_mass(
     total_force_z_N: np.ndarray,
-    reach_m_s2: np.ndarray | None,
+    trunk_markers_m: np.ndarray,
     frames: np.ndarray,
     rate_hz: float,
 ) -> float | None:
-    """The largest mass [kg] with which the force goes with the motion, as in `contact_windows`, in
-    many of the ``frames`` (n_frames,) bool: in half as many as with any other.
+    """The largest mass [kg] with which the force goes with the trunk's motion in many of the
+    ``frames`` (n_frames,) bool: in half as many as with any other.
 
     Only good enough to find frames in which something else bears the person; the largest, because
-    what bears a person takes weight off the plates. None without load or motion.
+    what bears a person takes weight off the plates. None without load or trunk markers.
     """
-    if reach_m_s2 is None:
+    reach = reach_m_s2(trunk_markers_m, rate_hz)
+    if reach is None:
         return None
     measured = low_pass(total_force_z_N, rate_hz)
-    loaded = frames & (measured > 5 * TOUCHED_N) & (reach_m_s2 > GRAVITY_M_S2 / 2)
+    loaded = frames & (measured > 5 * TOUCHED_N) & (reach > GRAVITY_M_S2 / 2)
     if not loaded.any():
         return None
-    masses = np.sort(measured[loaded] / reach_m_s2[loaded])
+    masses = np.sort(measured[loaded] / reach[loaded])
     near = 1.0 + _MISMATCH_SHARE / 2
     above = np.searchsorted(masses, masses * near, side="right")
     count = above - np.searchsorted(masses, masses / near)
     return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
+
+
+def reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:
+    """Gravity and the vertical acceleration of the markers' mean (n_frames, k, 3), low-passed,
+    (n_frames,)."""
+    height = mean_path(trunk_markers_m[..., 2])
+    if height is None:
+        return None
+    velocity = np.gradient(low_pass(height, rate_hz)) * rate_hz
+    return GRAVITY_M_S2 + np.gradient(velocity) * rate_hz
 
 
 def mean_path(height: np.ndarray) -> np.ndarray | None:
@@ -313,7 +323,7 @@ def mean_path(height: np.ndarray) -> np.ndarray | None:
 
 def low_pass(signal: np.ndarray, rate_hz: float) -> np.ndarray:
     """Zero phase, order 4."""
-    cutoff = min(_CUTOFF_HZ, 0.45 * rate_hz)
+    cutoff = min(_TRUNK_CUTOFF_HZ, 0.45 * rate_hz)
     sections = butter(2, cutoff, fs=rate_hz, output="sos")
     pad = min(len(signal) - 1, round(rate_hz))
     return sosfiltfilt(sections, np.asarray(signal), padlen=pad)

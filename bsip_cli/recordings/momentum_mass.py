@@ -150,13 +150,6 @@ def segment_motion(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> Segme
     return SegmentMotion(centre, common, own_sd, acceleration)
 
 
-def reach_m_s2(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> np.ndarray | None:
-    """(n,) gravity and the vertical acceleration of the centre of mass, which the ground bears;
-    None without a marker on the trunk."""
-    motion = segment_motion(markers_m, rate_hz)
-    return None if motion is None else GRAVITY_M_S2 + motion.acceleration_m_s2
-
-
 def _carrier(kind: str, side: str, names: Collection[str]) -> str:
     """The nearest seen segment from a kind on towards the trunk; empty if there is none."""
     for _ in _KINDS:

@@ -13,10 +13,10 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads
+from bsip_cli.recordings.contacts import foot_contacts, low_pass, plate_loads, reach_m_s2
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.momentum_mass import Interval, intervals_alone, reach_m_s2
+from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
 from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.plates import LOADED_N
@@ -25,6 +25,7 @@ from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import FORCE_UNITS_N, Written
+from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
 _LIGHTLY_LOADED_N = 20.0
@@ -413,12 +414,14 @@ def lost_zeros(plates: Sequence[Plate], reversed_names: list[str], recording: Re
     """Empty, or that the plates were set to zero under the person.
 
     Then a plate that somebody leaves reads a pull, as one does whose sign is the other one; but
-    reversed, all plates together go less with the motion of the body than as recorded.
+    reversed, all plates together go less with the motion of the trunk than as recorded.
     """
-    if not 0 < len(reversed_names) < len(plates):
-        return ""
     segments = by_segment(recording.labels, recording.markers_m)
-    if (reach := reach_m_s2(segments, recording.marker_rate_hz)) is None:
+    trunk = [segments[name] for name in TRUNK if name in segments]
+    if not trunk or not 0 < len(reversed_names) < len(plates):
+        return ""
+    reach = reach_m_s2(np.concatenate(trunk, axis=1), recording.marker_rate_hz)
+    if reach is None:
         return ""
     frames = np.arange(recording.n_frames) / recording.marker_rate_hz
     times = np.arange(len(plates[0].usable)) / recording.analog_rate_hz
@@ -434,7 +437,7 @@ def lost_zeros(plates: Sequence[Plate], reversed_names: list[str], recording: Re
     some = " and ".join(reversed_names)
     return (
         f"plate {some} pulls, and reversed it makes all plates together read from "
-        f"{total.min():.0f} to {total.max():.0f} N of a person who hardly rises or falls, "
+        f"{total.min():.0f} to {total.max():.0f} N of a person whose trunk hardly rises or falls, "
         f"as recorded the same throughout to {np.std(recorded):.0f} N: the plates were set to zero "
         "under the person; record again, with the plates set to zero while nobody stands on them"
     )

@@ -28,13 +28,12 @@ from bsip_cli.recordings.momentum_mass import (
     Interval,
     intervals_alone,
     intervals_of,
-    reach_m_s2,
     upright_frames,
 )
 from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.running.unit import Unit
-from bsip_cli.segments import SEGMENTS
+from bsip_cli.segments import SEGMENTS, TRUNK
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
 from bsip_cli.stages.survey import opened, prefix_of, reading_of
@@ -145,7 +144,7 @@ def _contacts(
 ) -> tuple[ContactWindows, tuple[Interval, ...], list[Finding]]:
     """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
-    rate_hz = recording.marker_rate_hz
+    rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
     feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
@@ -154,11 +153,10 @@ def _contacts(
     alone = intervals_alone(markers, feet, loads, rate_hz)
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
     about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
-    reach = reach_m_s2(markers, rate_hz)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
-        mass = agreeing_mass(feet.total_N, reach, loaded, rate_hz)
-    return contact_windows(feet, reach, mass, rate_hz, stands_kg), intervals, about_mass
+        mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
+    return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
 
 
 def _mass_on_plates(

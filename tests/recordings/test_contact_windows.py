@@ -8,7 +8,6 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
 from bsip_cli.recordings.contacts import PlateLoad, contact_windows, foot_contacts
-from bsip_cli.recordings.momentum_mass import reach_m_s2
 
 RATE_HZ = 100.0
 N = 300
@@ -42,8 +41,7 @@ def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> Pla
 def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None):
     feet = foot_contacts({"l": left, "r": right}, RATE_HZ, plates, N)
     trunk = _trunk() if trunk is None else trunk
-    reach = reach_m_s2({"upper_torso": trunk}, RATE_HZ)
-    return contact_windows(feet, reach, mass_kg, RATE_HZ, stands_kg)
+    return contact_windows(feet, trunk, mass_kg, RATE_HZ, stands_kg)
 
 
 def test_standing_on_the_plate_is_valid():

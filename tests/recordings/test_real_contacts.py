@@ -14,7 +14,6 @@ from bsip_cli.recordings.contacts import (
     plate_loads,
 )
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.momentum_mass import reach_m_s2
 from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
 
@@ -36,8 +35,7 @@ def _windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contact
     loads = plate_loads(recording, wrench_at_marker_rate(recording))
     rate_hz = recording.marker_rate_hz
     feet = foot_contacts({"l": left, "r": right}, rate_hz, loads, recording.n_frames)
-    reach = reach_m_s2({"upper_torso": trunk}, rate_hz)
-    return contact_windows(feet, reach, mass_kg, rate_hz)
+    return contact_windows(feet, trunk, mass_kg, rate_hz)
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def usual_words(effect: str) -> str:
     return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
 
 
-# --- what to check, and to record, where a cause is unknown or one of several --------------------------------------------------------------
+# --- what to check, and to record, where a cause is unknown or one of several ---------------------
 
 
 def check_for(target: str, parameters: Sequence[str]) -> str:
@@ -140,14 +140,15 @@ def check_for(target: str, parameters: Sequence[str]) -> str:
     fault that it acts like; empty where it is like none."""
     channel, _, quantity = target.partition(" by ")
     kind = "frequency" if "frequency" in parameters else quantity.partition("_")[0]
-    if check := _WORDS["checks"].get(kind):
+    checks = (one["check"] for one in _WORDS["checks"] if kind in one["of"])
+    if check := next(checks, ""):
         return f"{check.format(channel=_WORDS['channels'].get(channel, 'forces'))}."
     like = (name for name, usual in USUAL.items() if {*usual.parameters} & {*parameters})
     if (name := next(like, None)) is None:
         return ""
     where = f" ({place})" if (place := place_label(name, target)) else ""
     title, remedy = effect_title(name), EFFECTS[name].remedy
-    return f"{_WORDS['checks']['like'].format(title=title, place=where, remedy=remedy)}."
+    return f"{_WORDS['acts_like'].format(title=title, place=where, remedy=remedy)}."
 
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")

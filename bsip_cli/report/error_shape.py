@@ -19,8 +19,9 @@ _BRIEF_S = 0.2  # to either side of the worst moment
 @dataclass(frozen=True)
 class Shape:
     """``kind`` : shifted (a centre of pressure, by a constant), constant (of a force), load (goes
-    along with it), brief, impact (the force changes fast), light (there is little load) or mixed. ``column`` : of the signals, the one with most of
-    the error. ``worst_s`` : when it is largest [s]."""
+    along with it), brief, impact (the force changes fast), light (there is little load) or mixed.
+    ``column`` : of the signals, the one with most of the error. ``worst_s`` : when it is largest [s].
+    """
 
     kind: str
     column: str

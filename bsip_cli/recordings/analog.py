@@ -68,7 +68,11 @@ def check_samples(
     is_natural = 2 * absent.sum() > unloaded.sum() or not (load[1:] * load[:-1] < 0).any()
     gone = absent & is_natural
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
+    moves = any(np.ptp(np.nan_to_num(channel)) > 0 for channel in counts.T)
     for i, channel in enumerate(counts.T):
+        if moves and channels[0, i] and np.ptp(channels[:, i]) == 0:
+            stuck[:, i] = True
+            continue
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
         noise = _noise_beyond_rounding(channel)
         stuck[:, i] = _stuck(channel, noise, load, gone, spikes, rate_hz, channels.shape[1])
@@ -317,7 +321,7 @@ def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Fi
         Finding(f"analog_{name}", plate, f"{mask.sum()} of {n} samples {words}", *said)
         for name, words, mask in (
             ("nan", "are not a number", samples.not_a_number),
-            ("clipped", "lie at the converter's limit", samples.clipped),
+            ("clipped", "stay at the converter's limit, or at the last value", samples.clipped),
             ("stuck", f"repeat one value: {held}", stuck.any(axis=1)),
             ("lost", f"are zero in all channels at once: {lost}", samples.lost),
             ("repeated", f"equal the block before: {repeated}", samples.repeated),

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -208,7 +209,8 @@ def read_plates(
     ``length_unit_m`` is the size of the unit of points, corners and origins.
     """
     plates, findings, about_samples = [], [], []
-    for index in range(_n_plates(content.group("FORCE_PLATFORM"))):
+    group = content.group("FORCE_PLATFORM")
+    for index in range(_n_plates(group)):
         try:
             plate, about, faulty = _read_plate(content, length_unit_m, index, rotation_world_lab)
         except _UnusablePlateError as why:
@@ -218,6 +220,14 @@ def read_plates(
         plates.append(plate)
         findings += about
         about_samples += faulty
+    if plates and not _stated_plates(group):
+        found, expected = "FORCE_PLATFORM:USED counts no plate", f"the {len(plates)} it describes"
+        findings.append(Finding("plate", "", found, expected, "read them", "corrected"))
+    for one, other in combinations([plate.description for plate in plates], 2):
+        if np.abs(one.corners_m - other.corners_m).max() < _SAME_PLACE_M:
+            found, action = f"its corners are those of plate {one.name}", "took them as they are"
+            about = found, "a place of its own", f"{action}; correct FORCE_PLATFORM:CORNERS"
+            findings.append(Finding("plate", other.name, *about, "warning"))
     return plates, findings, about_samples
 
 
@@ -233,6 +243,16 @@ def plate_surfaces(group: Group, length_unit_m: float) -> list[np.ndarray]:
 
 
 def _n_plates(group: Group) -> int:
+    """As many as are used; if that is none, those that are described all the same."""
+    if stated := _stated_plates(group):
+        return stated
+    corners = np.ravel(numbers(group, "CORNERS"), order="F")
+    whole = corners[: len(corners) // 12 * 12].reshape(-1, 4, 3)[:_MOST_PLATES]
+    is_place = [bool(np.isfinite(one).all() and np.ptp(one, axis=0).any()) for one in whole]
+    return is_place.index(False) if False in is_place else len(is_place)
+
+
+def _stated_plates(group: Group) -> int:
     used = number(group, "USED")
     return int(min(max(used, 0), _MOST_PLATES)) if np.isfinite(used) else 0
 
@@ -244,7 +264,10 @@ def _read_plate(
     kind = _kind(group, index)
     written = _slab(group, "CORNERS", index, (3, 4)).T
     plate_unit_m, about_size = _plate_unit(written, length_unit_m, name)
-    origin = _slab(group, "ORIGIN", index, (3,)) * plate_unit_m
+    origin = _slab(group, "ORIGIN", index, (3,))
+    size_m = side_lengths(written * plate_unit_m).max()  # sensors lie no deeper, no farther aside
+    is_own = np.abs(origin).max() * plate_unit_m > size_m > np.abs(origin).max() * length_unit_m
+    origin = origin * (length_unit_m if is_own else plate_unit_m)
     if kind == 3 and not origin[:2].all():
         found = "a type 3 plate whose ORIGIN lacks the distances of the sensors"
         raise _UnusablePlateError(found, "the half distances a and b of the sensors")
@@ -315,7 +338,7 @@ def _plate_unit(
     if len(fitting) != 1:
         raise _UnusablePlateError(f"corners that are no plate: {found}", expected)
     ((unit, size),) = fitting.items()
-    action = f"read CORNERS and ORIGIN in {unit}: {_sides(written * size)}"
+    action = f"read CORNERS in {unit}: {_sides(written * size)}"
     expected += " in the unit of the points"
     return size, [Finding("unit", name, found, expected, action, "corrected")]
 

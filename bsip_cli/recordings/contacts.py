@@ -168,8 +168,8 @@ def contact_windows(
         loaded = feet.measured & (feet.total_N > TOUCHED_N)
         cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file)"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
-            cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the "
-            cause += "time (a plate that is not in the file, a rail)"
+            cause = f"the mass by which they are judged, {mass_kg:.1f} kg, is wrong, or something "
+            cause += "bears the person all the time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
         reasons += (_finding("", f"{force}: {cause} {times(unexplained, rate_hz, *_SAID)}"),)
     return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)

@@ -27,7 +27,8 @@ from bsip_cli.recordings.plate_reading import (
 )
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.plates_of_files import ForceOnPoint
-from bsip_cli.recordings.trial_samples import ALIKE_M, TrialSamples, pace, paces
+from bsip_cli.recordings.shared_forces import ALIKE_M
+from bsip_cli.recordings.trial_samples import TrialSamples, pace, paces
 from bsip_cli.recordings.under_the_feet import (
     Evidence,
     Feet,

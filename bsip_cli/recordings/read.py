@@ -24,7 +24,7 @@ from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
-from bsip_cli.recordings.written import FORCE_UNITS_N, Written
+from bsip_cli.recordings.written import Written, force_unit_words
 from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
@@ -98,8 +98,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     if maybe and not surely:
         expected, action = "accelerations as large as forces make them", "took the stated rate"
         findings.append(Finding("rate", "cameras", f"perhaps {maybe}", expected, action, "warning"))
-    others = (one.get(recording.path.stem, "") for one in (session.of_others, session.twins))
-    foreign = _other_trial(*others)
+    foreign = _not_its_own(recording, session)
     if note := recording.forces_note or foreign or surely:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
@@ -184,9 +183,9 @@ def findings_about(session: SessionReading) -> list[Finding]:
 def _about_written(written: Written) -> list[Finding]:
     findings = []
     if written.force_N != 1.0:
-        (unit,) = (name for name, size in FORCE_UNITS_N.items() if size == written.force_N)
         found, expected = "in N the forces would carry nobody of this size", "forces in N"
-        action = f"read forces and moments in {unit}, in all trials; export them in N"
+        action = f"read forces and moments {force_unit_words(written.force_N)}, in all trials; "
+        action += "export them in N"
         findings.append(Finding("unit", "forces", found, expected, action, "corrected"))
     for whose, pace in (("cameras", written.pace), ("forces", written.force_pace)):
         if pace != 1.0:
@@ -240,15 +239,34 @@ def _other_pace(times: float, rate_hz: float) -> str:
     )
 
 
-def _other_trial(name: str, twin: str) -> str:
-    """Empty if there is none; ``twin`` has the same forces."""
-    found = (
-        "its forces do not last as long as its markers, and those of other trials of the session "
-        f"neither, but as long as each other's: here as the markers of {name}"
-    )
-    if twin:
-        found = f"its forces are those of {twin} too, where the markers move otherwise"
-    return f"{found}; give each trial its own force table" if name or twin else ""
+def _not_its_own(recording: Recording, session: SessionReading) -> str:
+    """Why this trial's forces are not those of its markers; empty if they may be.
+
+    Raises BadDataError where its markers are those of no person, but of the other trials' one.
+    """
+    name, give = recording.path.stem, "give each trial its own force table"
+    if session.odd.get(name) == "sides":
+        raise BadDataError(
+            "left and right are exchanged all over the body, in this trial alone",
+            expected="left on the left, as in the other trials of the session",
+            remedy="export it in the axes of the others, or exchange its left and right labels",
+            file=recording.path,
+        )
+    if session.odd.get(name) == "forces":
+        return (
+            "as the forces of all other trials of the session are understood, they carry and drive "
+            "the body; this trial's do not, and nothing makes one person of both; look whether "
+            "they are this trial's, and exported as the others are"
+        )
+    if twin := session.twins.get(name):
+        return f"its forces are those of {twin} too, where the markers move otherwise; {give}"
+    if other := session.of_others.get(name):
+        return (
+            "its forces do not last as long as its markers, and those of other trials of the "
+            "session neither, but as long as each other's: here as the markers of "
+            f"{other}; {give}"
+        )
+    return ""
 
 
 def _about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
@@ -341,8 +359,8 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
         if not total.any():
             return found
         return (
-            f"{found}; if these are kN, kgf or parts of the weight, export them in N; if the "
-            "plates were set to zero under the person, record again"
+            f"{found}; if these are kN, kgf, N per kg or parts of the weight, export them in N or "
+            "state the person's mass; if the plates were set to zero under the person, record again"
         )
     return ""
 

@@ -385,15 +385,17 @@ class Handedness:
     parts: Mapping[str, float]
 
     @property
-    def is_mirrored(self) -> bool:
-        """Every part that is clear, and at least two, has left and right exchanged."""
-        clear = self._clear()
-        return len(clear) >= 2 and all(value < 0 for value in clear.values())
+    def sign(self) -> int:
+        """-1 if every part that is clear, and at least two, has left and right exchanged, 1 if none
+        has; else 0."""
+        clear = list(self._clear().values())
+        alike = len(clear) >= 2 and np.ptp(np.sign(clear)) == 0
+        return int(np.sign(clear[0])) if alike else 0
 
     def exchanged(self) -> list[str]:
         """Parts with left and right exchanged, where not all have."""
         wrong = [name for name, value in self._clear().items() if value < 0]
-        return [] if self.is_mirrored else wrong
+        return [] if self.sign < 0 else wrong
 
     def _clear(self) -> dict[str, float]:
         """Without those that do not stand square: feet one before the other."""

@@ -9,7 +9,7 @@ nothing makes a person of the forces, the plate is left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -26,12 +26,13 @@ from bsip_cli.recordings.plate_reading import (
     repeated_plates,
 )
 from bsip_cli.recordings.scene import Handedness, Stature
-from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, of_twins, surest
+from bsip_cli.recordings.shared_forces import Course, of_twins
+from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, surest
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
 from bsip_cli.recordings.written import (
     AS_WRITTEN,
-    FORCE_UNITS_N,
     Written,
+    force_N,
     force_unit,
     likely_paces,
     of_other_trials,
@@ -47,6 +48,8 @@ _MOSTLY_OUTSIDE = 0.8  # share of the load
 _UNKNOWN, _UNKNOWN_EACH = -6.2, -1.5
 
 Doubted = Literal["", "vertical moment", "force and centre of pressure"]
+
+Odd = Literal["sides", "forces"]
 
 _ALL: Doubted = "force and centre of pressure"
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
@@ -81,7 +84,7 @@ class SessionReading:
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
     stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one;
-    ``twins`` : where both have them.
+    ``twins`` : where both have them. ``odd`` : by trial that is not as all others are, in what.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
@@ -93,9 +96,20 @@ class SessionReading:
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     of_others: Mapping[str, str] = field(default_factory=dict)
     twins: Mapping[str, str] = field(default_factory=dict)
+    odd: Mapping[str, Odd] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
+
+    def refusals(self) -> list[str]:
+        """Of plates that are left out, by name, but for copies."""
+        return [name for name, one in self.plates.items() if one.refusal]
+
+    @property
+    def is_refused(self) -> bool:
+        """Nothing makes a person of any plate."""
+        counting = [one for one in self.plates.values() if not one.repeats]
+        return bool(counting) and all(one.refusal for one in counting)
 
     def gains(self) -> dict[str, float]:
         """Of plates that read another force than the load."""
@@ -118,32 +132,70 @@ def reading_of_files(
 ) -> SessionReading:
     """`session_reading` of trials as their files say, or ``read`` otherwise: with forces of another
     unit than N, or of markers or forces of another rate than the stated one. Trials that have each
-    other's forces tell nothing.
+    other's forces tell nothing, nor does one that is not as all others are: left and right are
+    exchanged in it, or without it, its forces make a person.
 
     stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
     """
-    surely = limits.corrected_percent / 100
     whose = of_other_trials([one.lengths for one in trials])
     of_others = {trials[k].name: trials[other].name for k, other in whose.items()}
-    twins = of_twins(trials, limits)
-    if foreign := {*of_others, *twins}:
+    twins = of_twins([(one.name, one.course) for one in trials], limits)
+    usual = Handedness.of_all([one.hands for one in trials]).sign or 1
+    odd: dict[str, Odd] = {one.name: "sides" for one in trials if one.hands.sign == -usual}
 
-        def own(written: Written = AS_WRITTEN) -> list[TrialSamples]:
-            nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "total_N": np.zeros(0)}
-            return [
-                replace(one.without(one.sources), **nothing) if one.name in foreign else one
-                for one in read(written)
-            ]
+    def of_own_forces(written: Written = AS_WRITTEN) -> list[TrialSamples]:
+        every = trials if written == AS_WRITTEN else read(written)
+        return _without_forces(every, {*of_others, *twins, *odd})
 
-        found = reading_of_files(own(), own, stated_kg, stated_m, gross_percent, limits)
-        return replace(found, of_others=of_others, twins=twins)
+    stated = stated_kg, stated_m, gross_percent, limits
+    found = _reading_of_own(of_own_forces, *stated)
+    if name := _odd_trial(of_own_forces(found.written), found, limits):
+        odd[name] = "forces"
+        found = _reading_of_own(of_own_forces, *stated)
+    return replace(found, of_others=of_others, twins=twins, odd=odd)
+
+
+def _without_forces(trials: Sequence[TrialSamples], names: Collection[str]) -> list[TrialSamples]:
+    """Trials as they are, those of these ``names`` without all that tells of forces."""
+    nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "course": Course()}
+    return [
+        replace(one.without(one.sources), **nothing) if one.name in names else one for one in trials
+    ]
+
+
+def _odd_trial(trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits) -> str:
+    """The one trial without which forces that are no person's as ``found`` are one's; empty if
+    there is none, or if it may be one or another."""
+    if not found.is_refused:
+        return ""
+    some = [k for k, one in enumerate(trials) if one.sources]
+    alone = {k: session_reading([trials[k]], limits) for k in some}
+    own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
+    refused = [k for k, one in alone.items() if one.is_refused]
+    may_be = refused or [k for k in some if list(own.values()).count(own[k]) == 1]
+    if len(refused) > 1 or len(some) < 2:
+        return ""
+    rest = {k: [*trials[:k], *trials[k + 1 :]] for k in may_be}
+    clear = [k for k, others in rest.items() if not session_reading(others, limits).refusals()]
+    return trials[clear[0]].name if len(clear) == 1 else ""
+
+
+def _reading_of_own(
+    read: Callable[..., Sequence[TrialSamples]],
+    stated_kg: float | None,
+    stated_m: float | None,
+    gross_percent: float,
+    limits: GateLimits,
+) -> SessionReading:
+    """As `reading_of_files` has it, of trials that all count."""
+    surely, trials = limits.corrected_percent / 100, read()
     written, masses = AS_WRITTEN, [one.mass_kg for one in trials if one.mass_kg]
     if masses:
         usual = Stature.of_all([one.stature for one in trials])
         height_m = stated_m or (None if usual is None else usual.height_m)
         mass_kg = float(np.median(masses))
         if name := force_unit(mass_kg, stated_kg, height_m, gross_percent, surely):
-            written = Written(FORCE_UNITS_N[name])
+            written = Written(force_N(name, stated_kg))
             trials = read(written)
     found = session_reading(trials, limits)
     now, best = found.log_posterior, replace(found, written=written)
@@ -181,7 +233,7 @@ def session_reading(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) 
 
 
 def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
-    is_mirrored = Handedness.of_all([trial.hands for trial in trials]).is_mirrored
+    is_mirrored = Handedness.of_all([trial.hands for trial in trials]).sign < 0
     changes = MIRRORS if is_mirrored else (FrameChange(), *FORCES_MOVED)
     repeats = repeated_plates([trial.sources for trial in trials])
     trials = [trial.without(repeats) for trial in trials if trial.sources]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -31,6 +30,7 @@ from bsip_cli.recordings.plate_reading import (
 )
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
+from bsip_cli.recordings.shared_forces import Course
 from bsip_cli.recordings.under_the_feet import Feet
 from bsip_cli.recordings.written import OTHER_RATE, PACES, Lengths
 
@@ -76,6 +76,10 @@ class Lags:
     of_force: np.ndarray
     of_lift: np.ndarray
     path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def steps_s(self) -> np.ndarray:
+        """Of the path."""
+        return (self.seconds[1] - self.seconds[0]) * np.arange(len(self.path_m))
 
     def _now(self) -> np.ndarray:
         """(3,) of each kind at the stated times, nearly."""
@@ -213,10 +217,6 @@ def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
 
 _FEW = 100  # samples that each plate of a trial is seen by
 _LOADED = 0.05  # of the largest force: less is nobody
-_BLOCK_S = 0.02  # over which a total is averaged: filters leave it as it is
-_FEWEST = 50  # blocks: of 20 one, two strides of two people correlate by 0.984
-_SAME = 0.999  # correlation over equal times; of all public trials otherwise 0.988 at most
-ALIKE_M = 0.01  # centres of pressure, and paths of the body, that differ by less are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,8 +226,7 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be. ``total_N`` : the plates' vertical force in each 20 ms,
-    and ``path_m`` of the centre of mass there, as far as known; how well both go is ``goes``.
+    another ``delay``, of each that may be. ``course`` : to compare it with that of others.
     """
 
     name: str
@@ -244,21 +243,17 @@ class TrialSamples:
     mass_kg: float = 0.0
     delay: Delay = NO_DELAY
     late: tuple[TrialSamples, ...] = ()
-    total_N: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    goes: float = 0.0
+    course: Course = field(default_factory=Course)
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
-        if stated.sources:
-            stated = replace(stated, total_N=_total_N(opened))
         found = lags(opened, limits) if stated.sources else None
         if found is None:
-            return stated
+            return replace(stated, course=Course.of(opened)) if stated.sources else stated
         none, *others = found.delays(limits)
-        path_m = _in_blocks(found, len(stated.total_N))
-        stated = replace(stated, path_m=path_m, goes=found.goes())
+        course = Course.of(opened, found.steps_s(), found.path_m, found.goes())
+        stated = replace(stated, course=course)
         late = (
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others
@@ -333,64 +328,3 @@ def _mass_kg(opened: Opened) -> float:
     carried = size[needed > FALLS * GRAVITY_M_S2] / needed[needed > FALLS * GRAVITY_M_S2]
     loaded = carried[carried > _LOADED * carried.max(initial=0.0)]
     return float(np.percentile(loaded, 90)) if len(loaded) else 0.0
-
-
-def same_movements(trials: Sequence[TrialSamples]) -> list[tuple[str, str]]:
-    """Names of pairs that are one recording, exported twice: filtered, renamed, in two formats."""
-    return [(one.name, other.name) for one, other in _same_forces(trials) if _alike(one, other)]
-
-
-def of_twins(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> dict[str, str]:
-    """Trials, by name, that have the forces of another one, which moves otherwise. They are of that
-    with which they surely go better; where that is not sure, of neither."""
-    surely = -float(np.log(1 - limits.corrected_percent / 100))
-    pairs = [pair for pair in _same_forces(trials) if not _alike(*pair)]
-    return {
-        own.name: twin.name
-        for pair in pairs
-        for own, twin in (pair, pair[::-1])
-        if own.goes < twin.goes + surely
-    }
-
-
-def _same_forces(trials: Sequence[TrialSamples]) -> list[tuple[TrialSamples, TrialSamples]]:
-    pairs = combinations(trials, 2)
-    return [(one, other) for one, other in pairs if _are_same(one.total_N, other.total_N)]
-
-
-def _are_same(one: np.ndarray, other: np.ndarray) -> bool:
-    n = min(len(one), len(other))
-    if max(len(one), len(other)) > n + 1 or n < _FEWEST:
-        return False
-    both = np.array([one[:n], other[:n]])
-    return bool(both.std(axis=1).all() and abs(np.corrcoef(both)[0, 1]) > _SAME)
-
-
-def _alike(one: TrialSamples, other: TrialSamples) -> bool:
-    """Whether the centres of mass take one path, in axes that may be turned about the vertical;
-    or nothing shows that they do not."""
-    n = min(len(one.path_m), len(other.path_m))
-    paths = np.array([one.path_m[:n], other.path_m[:n]])
-    paths = paths[:, np.isfinite(paths).all(axis=(0, 2))]
-    if not paths.size:
-        return True
-    paths -= paths.mean(axis=1, keepdims=True)
-    across = paths[..., :2] @ [1.0, 1j]
-    turned = 2 * abs((across[0].conj() * across[1]).mean())
-    level = (np.abs(across) ** 2).mean(axis=1).sum() - turned
-    return bool(level + ((paths[0] - paths[1])[:, 2] ** 2).mean() < ALIKE_M**2)
-
-
-def _in_blocks(found: Lags, n: int) -> np.ndarray:
-    """The path of the centre of mass (n, 3) in the middle of each block of a total."""
-    times = _BLOCK_S * (0.5 + np.arange(n))
-    steps = (found.seconds[1] - found.seconds[0]) * np.arange(len(found.path_m))
-    return np.column_stack([np.interp(times, steps, one, right=np.nan) for one in found.path_m.T])
-
-
-def _total_N(opened: Opened) -> np.ndarray:
-    """(n,) of all plates, as the file says."""
-    lifts = [np.where(s.usable, np.nan_to_num(lift_N(s)), 0.0) for s in opened.sources]
-    step = max(1, round(_BLOCK_S * opened.recording.analog_rate_hz))
-    total = np.sum(lifts, axis=0) if lifts else np.zeros(0)
-    return np.asarray(total[: len(total) // step * step].reshape(-1, step).mean(axis=1))

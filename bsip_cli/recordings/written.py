@@ -14,6 +14,9 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.stated import percent_apart
 
 FORCE_UNITS_N = {"kN": 1000.0, "kilogram-force": 9.80665, "pounds-force": 4.44822}
+# Of exports that divide forces by the person's mass or weight: the mass of which they are a force
+# of 1 on, where they carry so much.
+_NORMALISED_KG = {"N per kg of the person's mass": 1.0, "parts of the weight": 1 / GRAVITY_M_S2}
 # Logarithms: of thirty sessions of text files one is in another unit, as units of moments; in all
 # trials of one of a hundred a foot beside the plates or a rail bears up to half of the weight, of
 # one of three thousand a seat up to nine tenths.
@@ -136,8 +139,22 @@ def force_unit(
         name: _OTHER_UNIT - np.log(len(FORCE_UNITS_N)) + log_likelihood(size * mass_kg)
         for name, size in FORCE_UNITS_N.items()
     } | {"N": log_likelihood(mass_kg), "": logsumexp(partly) - np.log(_SHARES)}
-    if percent_apart(mass_kg * GRAVITY_M_S2, 1.0) <= gross_percent:  # parts of the weight
-        logs["weight"] = _OTHER_UNIT + norm.logpdf(0.0, scale=_BMI_SD)
+    for name, kg in _NORMALISED_KG.items():
+        if percent_apart(mass_kg, kg) <= gross_percent:
+            logs[name] = _OTHER_UNIT + norm.logpdf(0.0, scale=_BMI_SD)
     best = max(logs, key=lambda name: logs[name])
     is_sure = logs[best] - logsumexp(list(logs.values())) >= np.log(surely)
-    return best if is_sure and best in FORCE_UNITS_N else ""
+    return best if is_sure and best != "N" else ""
+
+
+def force_N(unit: str, stated_kg: float | None) -> float:
+    """Of 1 in such a unit; 1 where that needs the person's mass, which is not stated."""
+    if unit in _NORMALISED_KG:
+        return 1.0 if stated_kg is None else stated_kg / _NORMALISED_KG[unit]
+    return FORCE_UNITS_N[unit]
+
+
+def force_unit_words(size_N: float) -> str:
+    """What forces of another unit were read as."""
+    names = [name for name, size in FORCE_UNITS_N.items() if size == size_N]
+    return f"in {names[0]}" if names else f"as divided by the person's mass, times {size_N:.4g}"

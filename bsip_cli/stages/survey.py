@@ -23,7 +23,8 @@ from bsip_cli.recordings.plate_reading import FrameChange, Opened, PlateReading
 from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files
-from bsip_cli.recordings.trial_samples import TrialSamples, same_movements
+from bsip_cli.recordings.shared_forces import same_movements
+from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.recordings.written import AS_WRITTEN, Written
 from bsip_cli.running.unit import Unit
@@ -31,7 +32,7 @@ from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
-_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others", "twins")
+_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others", "twins", "odd")
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
 _NO_TEST = "what is found in one is no test of the other; remove one of them"
@@ -71,10 +72,10 @@ def run(unit: Unit) -> None:
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    for first, again in same_movements(every):
+    for first, again in same_movements([(one.name, one.course) for one in every]):
         unit.say(
-            f"{again} has the forces of {first} and moves alike: one recording exported twice, or "
-            f"one has the other's forces; {_NO_TEST}"
+            f"{again} has the forces of {first}, or of a part of it, and moves alike: one "
+            f"recording exported twice, or one has the other's forces; {_NO_TEST}"
         )
     unit.write("readings", rows, facts | written)
 

@@ -70,8 +70,9 @@ def check_samples(
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
     moves = any(np.ptp(np.nan_to_num(channel)) > 0 for channel in counts.T)
     for i, channel in enumerate(counts.T):
-        if moves and channels[0, i] and np.ptp(channels[:, i]) == 0:
-            stuck[:, i] = True
+        if moves and np.ptp(channels[:, i]) == 0 and (channels[0, i] or not load.any()):
+            stuck[:, i] = bool(channels[0, i])
+            silent += [] if stuck[0, i] else [i]
             continue
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
         noise = _noise_beyond_rounding(channel)

@@ -225,9 +225,9 @@ def read_plates(
         findings.append(Finding("plate", "", found, expected, "read them", "corrected"))
     for one, other in combinations([plate.description for plate in plates], 2):
         if np.abs(one.corners_m - other.corners_m).max() < _SAME_PLACE_M:
-            found, action = f"its corners are those of plate {one.name}", "took them as they are"
-            about = found, "a place of its own", f"{action}; correct FORCE_PLATFORM:CORNERS"
-            findings.append(Finding("plate", other.name, *about, "warning"))
+            found, expected = f"its corners are those of plate {one.name}", "a place of its own"
+            action = "took them as they are; correct FORCE_PLATFORM:CORNERS"
+            findings.append(Finding("plate", other.name, found, expected, action, "warning"))
     return plates, findings, about_samples
 
 

@@ -14,10 +14,10 @@ from bsip_cli.recordings.body_motion import USUAL, GateLimits
 from bsip_cli.recordings.plate_reading import Opened, lift_N
 
 _BLOCK_S = 0.02  # over which a total is averaged: filters leave it as it is
-_FEWEST = 50  # blocks: of 20 one, two strides of two people correlate by 0.984
-_SAME = 0.998  # of the variance; of all public trials otherwise 0.995 at most, of 59 at any shift
+_FEWEST = 40  # blocks: parts of 30 of other trials are alike by 0.9993 at some shift
+_SAME = 0.998  # of the variance; parts of 40 of 54 other public trials are by 0.9975 at any shift
 _TAPS = np.arange(-2, 3)  # blocks from which another export's may be made up: cut within a block
-_SIZE = 0.05  # by which those may sum to another size
+_SIZE = 0.01  # by which those may sum to another size: cuts of public trials by 0.003
 _SHIFTS = 5  # likeliest ones that are looked at: strides are alike
 ALIKE_M = 0.01  # centres of pressure, and paths of the body, that differ by less are one
 

@@ -14,7 +14,9 @@ from bsip_cli.recordings.written import (
     AS_WRITTEN,
     Lengths,
     Written,
+    force_N,
     force_unit,
+    force_unit_words,
     likely_paces,
     of_other_trials,
 )
@@ -33,6 +35,14 @@ def lengths(*pairs: tuple[float, float]) -> list[Lengths | None]:
 def test_the_unit_that_alone_makes_the_person(unit, stated_kg, body_kg):
     stated_kg = stated_kg and body_kg
     assert force_unit(body_kg * SIZES[unit], stated_kg, 1.75, 15.0, 0.95) == unit
+
+
+@pytest.mark.parametrize("body_kg", [60.0, 85.0])
+def test_forces_by_the_persons_mass_or_weight_need_the_mass(body_kg):
+    for mass_kg, size_N in ((1.0, body_kg), (1 / 9.80665, 9.80665 * body_kg)):
+        unit = force_unit(mass_kg, body_kg, 1.75, 15.0, 0.95)
+        assert force_N(unit, body_kg) == pytest.approx(size_N) and force_N(unit, None) == 1.0
+        assert f"{size_N:.4g}" in force_unit_words(force_N(unit, body_kg))
 
 
 @pytest.mark.parametrize(

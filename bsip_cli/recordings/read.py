@@ -258,6 +258,11 @@ def _not_its_own(recording: Recording, session: SessionReading) -> str:
             "the body; this trial's do not, and nothing makes one person of both; look whether "
             "they are this trial's, and exported as the others are"
         )
+    if unit := session.odd.get(name):
+        return (
+            "in N they carry another mass than the forces of the session's other trials, as if "
+            f"they were in {unit}; export all in N"
+        )
     if twin := session.twins.get(name):
         return f"its forces are those of {twin} too, where the markers move otherwise; {give}"
     if other := session.of_others.get(name):

@@ -49,8 +49,6 @@ _UNKNOWN, _UNKNOWN_EACH = -6.2, -1.5
 
 Doubted = Literal["", "vertical moment", "force and centre of pressure"]
 
-Odd = Literal["sides", "forces"]
-
 _ALL: Doubted = "force and centre of pressure"
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
 AGAINST = "its force is not one that carries and drives the body that the markers show"
@@ -84,7 +82,8 @@ class SessionReading:
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
     trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
     stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one;
-    ``twins`` : where both have them. ``odd`` : by trial that is not as all others are, in what.
+    ``twins`` : where both have them. ``odd`` : by trial that is not as all others are,
+    in what: its "sides", its "forces", or the unit of these.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
@@ -96,7 +95,7 @@ class SessionReading:
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     of_others: Mapping[str, str] = field(default_factory=dict)
     twins: Mapping[str, str] = field(default_factory=dict)
-    odd: Mapping[str, Odd] = field(default_factory=dict)
+    odd: Mapping[str, str] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
@@ -141,7 +140,8 @@ def reading_of_files(
     of_others = {trials[k].name: trials[other].name for k, other in whose.items()}
     twins = of_twins([(one.name, one.course) for one in trials], limits)
     usual = Handedness.of_all([one.hands for one in trials]).sign or 1
-    odd: dict[str, Odd] = {one.name: "sides" for one in trials if one.hands.sign == -usual}
+    odd = _of_odd_units(trials, stated_m, gross_percent, limits)
+    odd |= {one.name: "sides" for one in trials if one.hands.sign == -usual}
 
     def of_own_forces(written: Written = AS_WRITTEN) -> list[TrialSamples]:
         every = trials if written == AS_WRITTEN else read(written)
@@ -161,6 +161,27 @@ def _without_forces(trials: Sequence[TrialSamples], names: Collection[str]) -> l
     return [
         replace(one.without(one.sources), **nothing) if one.name in names else one for one in trials
     ]
+
+
+def _of_odd_units(
+    trials: Sequence[TrialSamples],
+    stated_m: float | None,
+    gross_percent: float,
+    limits: GateLimits,
+) -> dict[str, str]:
+    """Trials, by name, whose forces surely are in another unit than those of the others, and it."""
+    units, height_m = {}, _height_m(trials, stated_m)
+    for k, trial in enumerate(trials):
+        others = [one.mass_kg for one in (*trials[:k], *trials[k + 1 :]) if one.mass_kg]
+        if trial.mass_kg and others:
+            stated = float(np.median(others)), height_m, gross_percent
+            units[trial.name] = force_unit(trial.mass_kg, *stated, limits.corrected_percent / 100)
+    return {name: unit for name, unit in units.items() if unit}
+
+
+def _height_m(trials: Sequence[TrialSamples], stated_m: float | None) -> float | None:
+    usual = Stature.of_all([one.stature for one in trials])
+    return stated_m or (None if usual is None else usual.height_m)
 
 
 def _odd_trial(trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits) -> str:
@@ -191,9 +212,7 @@ def _reading_of_own(
     surely, trials = limits.corrected_percent / 100, read()
     written, masses = AS_WRITTEN, [one.mass_kg for one in trials if one.mass_kg]
     if masses:
-        usual = Stature.of_all([one.stature for one in trials])
-        height_m = stated_m or (None if usual is None else usual.height_m)
-        mass_kg = float(np.median(masses))
+        mass_kg, height_m = float(np.median(masses)), _height_m(trials, stated_m)
         if name := force_unit(mass_kg, stated_kg, height_m, gross_percent, surely):
             written = Written(force_N(name, stated_kg))
             trials = read(written)

@@ -95,9 +95,8 @@ def exchanged(sources):
     ]
 
 
-@pytest.mark.parametrize("n", [3, 4])
-def test_one_trial_with_exchanged_plates_costs_the_others_nothing(n):
-    trials = [named(opened(of_c3d()), f"t{k}") for k in range(n - 1)]
+def test_one_trial_with_exchanged_plates_costs_the_others_nothing():
+    trials = [named(opened(of_c3d()), f"t{k}") for k in range(2)]
     trials.append(named(opened(exchanged(of_c3d())), "odd"))
     found = reading(trials)
     assert found.odd == {"odd": "forces"} and not found.refusals()
@@ -111,12 +110,6 @@ def test_which_of_two_is_odd_is_not_known():
     trials = [named(opened(of_c3d()), "a"), named(opened(exchanged(of_c3d())), "b")]
     found = reading(trials)
     assert found.odd == {}
-
-
-def test_forces_that_are_alike_in_all_trials_are_of_none_odd():
-    trials = [named(opened(exchanged(of_c3d())), f"t{k}") for k in range(3)]
-    found = reading(trials)
-    assert found.odd == {} and all(one.reading.place_of for one in found.plates.values())
 
 
 def test_one_trial_with_left_and_right_exchanged_is_refused():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.recordings.read import findings_about, open_recording
+from bsip_cli.recordings.read import assemble, findings_about, open_recording
 from bsip_cli.recordings.session_reading import reading_of_files
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.written import (
@@ -139,6 +139,16 @@ def settled(paths: list[Path], stated_kg: float | None = 62.6):
 def test_sound_files_are_read_as_they_are(real_data):
     found = settled([real_data / f"opencap_subject4/{name}.trc" for name in (*TRIALS, "DJ1")])
     assert found.written == AS_WRITTEN
+
+
+@pytest.mark.parametrize(("unit", "newton"), [("kN", 1000.0), ("pounds-force", 4.44822)])
+def test_one_trial_in_another_unit_is_left_without_forces(real_data, tmp_path, unit, newton):
+    paths = [real_data / f"opencap_subject4/{name}.trc" for name in TRIALS]
+    paths[1] = rewritten(real_data, tmp_path, TRIALS[1], force=newton)
+    found = settled(paths, stated_kg=None)
+    assert found.odd == {TRIALS[1]: unit} and found.written == AS_WRITTEN
+    assert unit in assemble(open_recording(paths[1]), found).forces_note
+    assert assemble(open_recording(paths[0]), found).plates
 
 
 @pytest.mark.parametrize(("unit", "newton"), [("kN", 1000.0), ("pounds-force", 4.44822)])

@@ -110,11 +110,6 @@ class Build:
     hinges: dict[str, np.ndarray]
 
 
-def heel_and_toe_m(foot_length_m: float) -> tuple[float, float]:
-    """X of the heel and of the metatarsal heads from the ankle joint, foot flat."""
-    return -0.27 * foot_length_m, 0.73 * foot_length_m
-
-
 def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
     """What swings, by segment; left and right at frequencies of their own."""
     return {
@@ -124,8 +119,24 @@ def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
 
 
 def place_markers(rng: np.random.Generator, build: Build, richness: Richness) -> dict[str, Marker]:
-    """The 38 markers of a person."""
-    return _skin_markers(_places(build, _regressed(build)), rng, richness)
+    """The 38 markers of a person.
+
+    From those of the thorax (origin CJC), the pelvis (origin at the true LJC) and the shoulders the
+    regressions predict the joint centres wrongly by the drawn errors.
+    """
+    width, (share, angle) = build.widths_m["thorax"], CERVICAL_SHARE[build.sex]
+    c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
+    found = {"C7": c7, "IJ": c7 + width * _in_plane(-STERNUM_SLOPE_DEG)}
+    share, angle = SHOULDER_FROM_ACROMION
+    across = build.widths_m["pelvis"]
+    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * across
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        spines = {"ASIS": [x, y, sign * z], "PSIS": [x - 0.68 * across, y, sign * 0.045]}
+        for name, place in spines.items():
+            found[side.upper() + name] = np.array(place) - build.errors_m["ljc"]
+        shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
+        found[f"{side.upper()}AC"] = shoulder - share * width * _in_plane(angle)
+    return _skin_markers(_places(build, found), rng, richness)
 
 
 def with_girdle(
@@ -207,21 +218,3 @@ def _rows() -> list[dict[str, str]]:
 def _in_plane(degrees: float) -> np.ndarray:
     """(3,) unit vector ahead, raised by an angle."""
     return np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees)), 0.0])
-
-
-def _regressed(build: Build) -> dict[str, np.ndarray]:
-    """Landmarks from which the regressions predict the joint centres wrongly by the drawn errors:
-    of the thorax (origin CJC), the pelvis (origin at the true LJC) and the shoulders."""
-    width, (share, angle) = build.widths_m["thorax"], CERVICAL_SHARE[build.sex]
-    c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
-    found = {"C7": c7, "IJ": c7 + width * _in_plane(-STERNUM_SLOPE_DEG)}
-    share, angle = SHOULDER_FROM_ACROMION
-    across = build.widths_m["pelvis"]
-    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * across
-    for side, sign in (("l", -1.0), ("r", 1.0)):
-        spines = {"ASIS": [x, y, sign * z], "PSIS": [x - 0.68 * across, y, sign * 0.045]}
-        for name, place in spines.items():
-            found[side.upper() + name] = np.array(place) - build.errors_m["ljc"]
-        shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
-        found[f"{side.upper()}AC"] = shoulder - share * width * _in_plane(angle)
-    return found

@@ -73,7 +73,11 @@ class Trial:
         feet = {side: (self.feet_force_n[side], self.feet_moment_nm[side]) for side in SIDES}
         if not apart:
             return feet
-        centres = {side: _centre_of_pressure(*feet[side]) for side in SIDES}
+        centres = {}
+        for side, (force, moment) in feet.items():  # on the floor; Y is up
+            load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
+            ahead, aside = moment[:, 2] / load, -moment[:, 0] / load
+            centres[side] = np.stack([ahead, np.zeros(len(load)), aside], axis=1)
         one, other = SIDES
         line = centres[other] - centres[one]
         line /= np.maximum(np.linalg.norm(line, axis=1), 1e-9)[:, None]
@@ -83,12 +87,6 @@ class Trial:
             force, moment = feet[side]
             feet[side] = (force + own, moment + np.cross(centres[side], own))
         return feet
-
-
-def _centre_of_pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """(T, 3) on the floor; Y is up."""
-    load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
-    return np.stack([moment[:, 2] / load, np.zeros(len(load)), -moment[:, 0] / load], axis=1)
 
 
 def simulate_trial(
@@ -332,8 +330,14 @@ def plate_wrenches(
     wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
     feet = trial.feet_wrenches(apart)
     for contact in trial.contacts:
-        index = _plate_of(contact, plates, pose)
-        if index is None:
+        ahead, aside = contact.cop_m
+        place = pose.points(np.array([ahead, 0.0, aside]))
+        distances = [plate.distance_m(place) for plate in plates]
+        if contact.on_plate:
+            index = int(np.argmin(distances))
+        elif 0.0 in distances[1:]:  # a later step meets one by chance
+            index = distances.index(0.0, 1)
+        else:
             continue
         start, end = (round(s * SIMULATION_HZ) for s in (contact.start_s, contact.end_s))
         window = slice(start, end + 1)
@@ -341,16 +345,6 @@ def plate_wrenches(
         wrenches[index][0][window] += force
         wrenches[index][1][window] += moment
     return wrenches
-
-
-def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
-    """The plate under a contact; of a later step the one that it happens to meet."""
-    ahead, aside = contact.cop_m
-    place = pose.points(np.array([ahead, 0.0, aside]))
-    distances = [plate.distance_m(place) for plate in plates]
-    if contact.on_plate:
-        return int(np.argmin(distances))
-    return next((k for k, distance in enumerate(distances) if k and distance == 0.0), None)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -423,7 +417,20 @@ def write_trial(
     ):
         for name, value in zip(parameters, values, strict=True):
             c3d["parameters"][group][name]["value"] = value
-    _add_plates(c3d, plates)
+    count = len(plates)  # integers of the group are set by hand because ezc3d writes floats
+    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
+    force_platform = c3d["parameters"]["FORCE_PLATFORM"]
+    for name, value in {
+        "USED": np.array([count]),
+        "TYPE": np.full(count, 2),
+        "ZERO": np.array([1, 0]),
+        "CHANNEL": np.arange(1, 6 * count + 1).reshape(count, 6).T,
+        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
+        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
+    }.items():
+        if name not in force_platform:
+            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
+        force_platform[name]["value"] = value
     c3d.add_parameter("SUBJECTS", "NAMES", [subject])
     c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])
     c3d["parameters"]["SUBJECTS"]["USES_PREFIXES"]["value"] = np.array([0])
@@ -442,22 +449,3 @@ def write_trial(
         channels = np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
     data["analogs"] = channels.T[None]
     c3d.write(str(path))
-
-
-def _add_plates(c3d: ezc3d.c3d, plates: Sequence[Plate]) -> None:
-    """The FORCE_PLATFORM group; integers are set by hand because ezc3d writes floats."""
-    n = len(plates)
-    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
-    group = {
-        "USED": np.array([n]),
-        "TYPE": np.full(n, 2),
-        "ZERO": np.array([1, 0]),
-        "CHANNEL": np.arange(1, 6 * n + 1).reshape(n, 6).T,
-        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
-        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
-    }
-    parameters = c3d["parameters"]["FORCE_PLATFORM"]
-    for name, value in group.items():
-        if name not in parameters:
-            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
-        parameters[name]["value"] = value

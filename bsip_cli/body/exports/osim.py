@@ -41,6 +41,7 @@ COORDINATES = {
 }
 """Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
 (flexion), X after that turn, and Y of the segment."""
+_KINDS = ("Body", "Joint", "Marker")
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _NOTES = (
     "SI units, Y up. Body frames: origin at the joint to the parent, axes of the segment (X",
@@ -56,9 +57,8 @@ def osim_text(body: IdentifiedPerson) -> str:
     document.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
     model = ET.SubElement(document, "Model", name=body.name)
     ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
-    bodies = _set_of(model, "BodySet", "bodyset")
-    joints = _set_of(model, "JointSet", "jointset")
-    markers = _set_of(model, "MarkerSet", "markerset")
+    sets = (ET.SubElement(model, f"{kind}Set", name=f"{kind}set".lower()) for kind in _KINDS)
+    bodies, joints, markers = (ET.SubElement(one, "objects") for one in sets)
     for i, name in enumerate(body.person.skeleton.segments):
         set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
         _add_joint(joints, body, i)
@@ -83,10 +83,6 @@ def add_texts(element: ET.Element, texts: Mapping[str, str]) -> None:
     """An element with a text below another, for each tag."""
     for tag, text in texts.items():
         ET.SubElement(element, tag).text = text
-
-
-def _set_of(model: ET.Element, tag: str, name: str) -> ET.Element:
-    return ET.SubElement(ET.SubElement(model, tag, name=name), "objects")
 
 
 def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
@@ -280,7 +276,8 @@ def _shared(model: GivenModel, group: BodyGroup, whole: pin.Inertia) -> dict[str
     for body, place in _placements(model, group).items():
         part = model.masses_kg[body] / total
         own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
-        parts[body] = _read(place.actInv(own))
+        seen = place.actInv(own)
+        parts[body] = Inertia(seen.mass, np.array(seen.lever), np.array(seen.inertia))
     return parts
 
 
@@ -357,10 +354,6 @@ def _segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> pin.I
         part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
         whole += first.actInv(pin.SE3(rotations[i], joints[i])).act(part)
     return whole
-
-
-def _read(inertia: pin.Inertia) -> Inertia:
-    return Inertia(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))
 
 
 # --- which bodies of a model are which segments, as data (configs/opensim) ------------------------

@@ -260,7 +260,14 @@ class OnSkin(Effect):
         column = instruments.column(self.marker or drawn)
         way = self.size * self.moved(instruments.frame_times_s())
         points = instruments.points_m.copy()
-        points[:, column] += way[:, None] * rotate(companion_frame(points, column), self.along)
+        distance = np.linalg.norm(points - points[:, [column]], axis=2)
+        seen = np.isfinite(distance).mean(axis=0)
+        spread = np.nanstd(np.where(seen > 0.5, distance, 0.0), axis=0)
+        spread = np.where(seen > 0.5, spread, np.inf)
+        spread[column] = np.inf
+        a, b, c = points[:, np.argsort(spread, kind="stable")[:COMPANIONS]].transpose(1, 0, 2)
+        # NaN where a companion is lost: then that frame of the marker is lost too
+        points[:, column] += way[:, None] * rotate(frame_of(b - a, c - a), self.along)
         return replace(instruments, points_m=points)
 
     @abstractmethod
@@ -306,20 +313,6 @@ class MarkerSlide(OnSkin, name="marker_slide"):
     def moved(self, times_s: np.ndarray) -> np.ndarray:
         start, end = (share * times_s[-1] for share in self.window_share)
         return glide(times_s, start, end, SOFT * (end - start))
-
-
-def companion_frame(points_m: np.ndarray, column: int) -> np.ndarray:
-    """(F, 3, 3) axes of the markers that keep their distance to a marker best.
-
-    NaN where one of them is lost: then that frame of the marker is lost too.
-    """
-    distance = np.linalg.norm(points_m - points_m[:, [column]], axis=2)
-    seen = np.isfinite(distance).mean(axis=0)
-    spread = np.nanstd(np.where(seen > 0.5, distance, 0.0), axis=0)
-    spread = np.where(seen > 0.5, spread, np.inf)
-    spread[column] = np.inf
-    a, b, c = points_m[:, np.argsort(spread, kind="stable")[:COMPANIONS]].transpose(1, 0, 2)
-    return frame_of(b - a, c - a)
 
 
 @dataclass(frozen=True, eq=False)

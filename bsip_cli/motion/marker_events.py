@@ -72,14 +72,6 @@ class _Problem:
         self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
         self.coefficient_sd = coefficient_sd
 
-    def products(self, r: float) -> np.ndarray:
-        """Sum of z z', whitened."""
-        return (1.0 + r * r) * self.squares - r * self.neighbours - r * r * self.ends
-
-    def with_steps(self, r: float) -> np.ndarray:
-        """(p, 1 + k + d) products of z with a step at each place, both whitened."""
-        return (1.0 + r * r) * self.after - r * self.around + r * (1.0 - r) * self.z[-1]
-
     def prior(self, error: float) -> np.ndarray:
         """(1 + k, 1 + k) what the prior adds to the equations."""
         return self.penalised * (error / self.coefficient_sd) ** 2
@@ -132,9 +124,11 @@ def find_level_change(
 
 
 def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:
-    n, x = len(problem.z), problem.of_x
+    n, x, r = len(problem.z), problem.of_x, correlation
     d = problem.z.shape[1] - x
-    products, steps = problem.products(correlation), problem.with_steps(correlation)
+    # Whitened: the sum of z z', and (p, 1 + k + d) products of z with a step at each place.
+    products = (1.0 + r * r) * problem.squares - r * problem.neighbours - r * r * problem.ends
+    steps = (1.0 + r * r) * problem.after - r * problem.around + r * (1.0 - r) * problem.z[-1]
     inverse = np.linalg.inv(products[:x, :x] + problem.prior(error))
     coefficients = inverse @ products[:x, x:]
     # What the columns leave of the signal and of the steps: the gain of each step follows.

@@ -91,10 +91,8 @@ class Skeleton:
 
     def informed(self, marked: Collection[str]) -> tuple[bool, ...]:
         """Whether each segment is a marked one or has one beyond it."""
-        known = [segment in marked for segment in self.segments]
-        for i in range(len(known) - 1, 0, -1):
-            known[self.parents[i]] |= known[i]
-        return tuple(known)
+        every = (self.beyond(i) for i in range(len(self.segments)))
+        return tuple(any(self.segments[k] in marked for k in beyond) for beyond in every)
 
     @cached_property
     def q_names(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from bsip_cli.body.inertia import second_moments
 from bsip_cli.errors import NumericalError
@@ -75,10 +75,7 @@ def hessian(phi: np.ndarray) -> np.ndarray:
     """(10 n, 10 n) of the sum of the divergences, one block per segment, whatever the table."""
     turned = np.einsum("nij,kjl->nkil", np.linalg.inv(pseudo_inertias(phi)), BASIS)
     blocks = np.einsum("nkil,nmli->nkm", turned, turned)
-    out = np.zeros((phi.size, phi.size))
-    for i, block in enumerate(blocks):
-        out[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = block
-    return out
+    return block_diag(*blocks)
 
 
 # --- the convex problem behind ``consistent``, and a damped Newton method for it ------------------

@@ -217,12 +217,8 @@ def marker_residuals(person: Person, q: np.ndarray, markers: np.ndarray) -> np.n
 
 def subtrees(person: Person) -> np.ndarray:
     """(n, m) True where marker m hangs on segment n or beyond it."""
-    parents = person.skeleton.parents
-    on = np.zeros((len(parents), len(person.markers)), dtype=bool)
-    on[person.marker_segments, np.arange(len(person.markers))] = True
-    for i in range(len(parents) - 1, 0, -1):
-        on[parents[i]] |= on[i]
-    return on
+    segments, skeleton = person.marker_segments, person.skeleton
+    return np.array([np.isin(segments, skeleton.beyond(i)) for i in range(len(skeleton.segments))])
 
 
 def pose_columns(

@@ -15,7 +15,7 @@ from bsip_cli.segments import without_side
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing
+from bsip_cli.simulate.landmarks import Marker, Swing, tissue_of
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
@@ -157,19 +157,6 @@ GAP_FRAMES = (5, 40)
 GAPS_PER_TRIAL = 1.5  # beyond the first one
 GAPS_PER_SECOND = 0.12
 LONGEST_GAP_SHARE = 0.15  # of a trial
-# The bones whose turning against a marker's bone moves the skin over it; * is the marker's side.
-NEIGHBOURS = {
-    "lower_torso": ("thigh_l", "thigh_r"),
-    "thorax": ("lower_torso", "head"),
-    "head": ("thorax", "thorax"),
-    "clavicle": ("thorax", "upper_arm*"),
-    "upper_arm": ("thorax", "forearm*"),
-    "forearm": ("upper_arm*", "hand*"),
-    "hand": ("forearm*", "forearm*"),
-    "thigh": ("lower_torso", "shank*"),
-    "shank": ("thigh*", "foot*"),
-    "foot": ("shank*", "shank*"),
-}
 MOVED_BY_THE_ARM = {"RAC": "upper_arm_r", "LAC": "upper_arm_l", "RSCAP": "upper_arm_r"}
 
 
@@ -202,7 +189,8 @@ def marker_paths(
 def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
     """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
     own, side = poses.rotation[marker.body], marker.body[-2:]
-    first, second = (name.replace("*", side) for name in NEIGHBOURS[without_side(marker.body)])
+    tissue = tissue_of(without_side(marker.body))
+    first, second = (tissue[end].replace("*", side) for end in ("proximal", "distal"))
     bodies = (first, MOVED_BY_THE_ARM.get(label, second))
     turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
     sines = np.concatenate(turns, axis=1)

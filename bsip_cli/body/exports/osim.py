@@ -227,9 +227,14 @@ def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson
     changed: dict[str, Inertia] = {}
     misfit: dict[str, float] = {}
     for group in body_map.groups:
-        shift, misfit[group.bodies[0]] = _fit(model, group, person)
-        whole = pin.SE3(np.eye(3), shift).act(_segments_as_one(person, group.segments))
-        changed |= _shared(model, group, whole)
+        placed = _placements(model, group)
+        whole, misfit[group.bodies[0]] = _united(model, group, placed, person)
+        total = sum(model.masses_kg[body] for body in group.bodies)
+        for body, place in placed.items():  # all parts have the whole's shape, so are it together
+            part = model.masses_kg[body] / total
+            own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
+            seen = place.actInv(own)
+            changed[body] = Inertia(seen.mass, np.array(seen.lever), np.array(seen.inertia))
     document = deepcopy(model.document)
     for element in document.iterfind(_BODIES):
         if element.attrib["name"] in changed:
@@ -253,32 +258,30 @@ def _sentence(misfit_m: dict[str, float], untouched: dict[str, float]) -> str:
     )
 
 
-def _fit(model: GivenModel, group: BodyGroup, person: IdentifiedPerson) -> tuple[np.ndarray, float]:
-    """Where the first segment's joint lies in the group's frame (3,), and the misfit [m]."""
+def _united(
+    model: GivenModel, group: BodyGroup, placed: dict[str, pin.SE3], person: IdentifiedPerson
+) -> tuple[pin.Inertia, float]:
+    """The segments as one in the neutral pose, in the group's frame, and the misfit [m]."""
     skeleton = person.person.skeleton
     rotations, joints = neutral_pose(person.person)
-    first = skeleton.index(group.segments[0])
-    placed, theirs = _placements(model, group), []
+    at = [skeleton.index(name) for name in group.segments]
+    turn, joint_m = rotations[at[0]], joints[at[0]]
+    whole = pin.Inertia.Zero()
+    for i in at:
+        own = person.in_joint(i)
+        part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
+        whole += pin.SE3(turn, joint_m).actInv(pin.SE3(rotations[i], joints[i])).act(part)
+    theirs = []
     for _, body in group.joints:  # centre of the joint that carries it
-        joint, own = model.joints[body], body in placed
-        there = placed[body] * joint.in_child if own else placed[joint.parent] * joint.in_parent
+        joint = model.joints[body]
+        inside = body in placed
+        there = placed[body] * joint.in_child if inside else placed[joint.parent] * joint.in_parent
         theirs.append(there.translation)
-    ways = [joints[skeleton.index(segment)] - joints[first] for segment, _ in group.joints]
-    shifts = np.array(theirs) - np.array([rotations[first].T @ way for way in ways])
+    ways = [joints[skeleton.index(segment)] - joint_m for segment, _ in group.joints]
+    shifts = np.array(theirs) - np.array([turn.T @ way for way in ways])
     shift = shifts.mean(axis=0)
-    return shift, float(np.linalg.norm(shifts - shift, axis=1).max())
-
-
-def _shared(model: GivenModel, group: BodyGroup, whole: pin.Inertia) -> dict[str, Inertia]:
-    """Each body's part of the whole: all parts have its shape, so together they are it."""
-    total = sum(model.masses_kg[body] for body in group.bodies)
-    parts = {}
-    for body, place in _placements(model, group).items():
-        part = model.masses_kg[body] / total
-        own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
-        seen = place.actInv(own)
-        parts[body] = Inertia(seen.mass, np.array(seen.lever), np.array(seen.inertia))
-    return parts
+    misfit_m = float(np.linalg.norm(shifts - shift, axis=1).max())
+    return pin.SE3(np.eye(3), shift).act(whole), misfit_m
 
 
 def _placements(model: GivenModel, group: BodyGroup) -> dict[str, pin.SE3]:
@@ -341,19 +344,6 @@ def _number(text: str) -> float:
     if not np.isfinite(value):
         raise ValueError(f"{text!r} instead of a number")
     return value
-
-
-def _segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> pin.Inertia:
-    """Segments united in the neutral pose, in the frame of the first one's joint."""
-    rotations, joints = neutral_pose(body.person)
-    at = [body.person.skeleton.index(name) for name in segments]
-    first = pin.SE3(rotations[at[0]], joints[at[0]])
-    whole = pin.Inertia.Zero()
-    for i in at:
-        own = body.in_joint(i)
-        part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
-        whole += first.actInv(pin.SE3(rotations[i], joints[i])).act(part)
-    return whole
 
 
 # --- which bodies of a model are which segments, as data (configs/opensim) ------------------------

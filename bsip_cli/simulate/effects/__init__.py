@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.effects import instruments, loads  # noqa: F401
-from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
+from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, OnSegment, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
 EFFECTS = {name: KINDS[name] for name in TABLE}
@@ -41,8 +42,8 @@ def pair_up(
     asked = tuple(map(Asked, names, sizes, targets or [""] * len(names)))
     for one in asked:
         effect = drawn(one, np.random.default_rng(0))
-        if simulated:
-            effect.check_simulated()
+        if simulated and isinstance(effect, OnSegment) and effect.segment not in SEGMENTS:
+            raise effect.wrong_target(effect.segment)  # only measured data can have it
     return asked
 
 

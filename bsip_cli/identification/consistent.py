@@ -303,7 +303,17 @@ def fit_with_weights(terms: Terms) -> Fit:
     for gamma in _GAMMAS:
         fit = fit_at(terms, Weights(spread, gamma), best)
         for _ in range(_ROUNDS):
-            old, new = fit.weights.spread, _updated(terms, fit)
+            x, old = fit.optimum.x, fit.weights.spread
+            removed, count = fit.prior_covariance - fit.optimum.covariance, terms.spread_weight
+            new = np.array(
+                [
+                    (count + max(weight * np.sum(removed * precision), 0.0))
+                    / (count + x @ precision @ x)
+                    for weight, precision in zip(old, terms.spreads, strict=True)
+                ]
+            )  # MacKay's rule
+            new = np.clip(new, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
+            new[_NEVER_WIDER] = np.maximum(new[_NEVER_WIDER], 1.0)
             fit = fit_at(terms, Weights(new, gamma), fit)
             if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
@@ -329,21 +339,6 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     )
     decided = max(float(decided - (1 - kept / known).sum()), 0.0)
     return Fit(weights, optimum, float(0.5 * logs - optimum.value), covariance, decided)
-
-
-def _updated(terms: Terms, fit: Fit) -> np.ndarray:
-    """MacKay's rule for the spreads."""
-    x, old, count = fit.optimum.x, fit.weights.spread, terms.spread_weight
-    removed = fit.prior_covariance - fit.optimum.covariance
-    spread = np.array(
-        [
-            (count + max(weight * np.sum(removed * precision), 0.0)) / (count + x @ precision @ x)
-            for weight, precision in zip(old, terms.spreads, strict=True)
-        ]
-    )
-    spread = np.clip(spread, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
-    spread[_NEVER_WIDER] = np.maximum(spread[_NEVER_WIDER], 1.0)
-    return spread
 
 
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.

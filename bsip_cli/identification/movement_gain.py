@@ -64,24 +64,21 @@ class Movement:
 
 def load_movements() -> tuple[Movement, ...]:
     """The movements of ``configs/movements.toml``, those of one side once for each side."""
-    rows = tomllib.loads(shipped("movements.toml").read_text(encoding="utf-8"))["movements"]
-    return tuple(
-        _movement(row, side) for row in rows for side in (_SIDES if "side" in row else ("",))
-    )
-
-
-def _movement(row: dict, side: str) -> Movement:
-    other = {"l": "r", "r": "l"}.get(side, "")
-    words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
-    letters, swings = {"side": side, "other": other}, []
-    for part in row["joints"]:
-        joint, axis = part["joint"].format(**letters), _AXES.index(part["axis"])
-        mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
-        middle, swing = (mirror * np.deg2rad(part[n]) for n in ("middle_deg", "swing_deg"))
-        phase = np.deg2rad(part.get("phase_deg", 0.0))
-        swings.append(Swing(joint, axis, middle, swing, tuple(part["hz"]), phase))
-    names = (row["name"].format(**letters), row["text"].format(**words))
-    return Movement(*names, row["stance"].format(**letters), tuple(swings))
+    text, movements = shipped("movements.toml").read_text(encoding="utf-8"), []
+    for row in tomllib.loads(text)["movements"]:
+        for side in _SIDES if "side" in row else ("",):
+            other = {"l": "r", "r": "l"}.get(side, "")
+            words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
+            letters, swings = {"side": side, "other": other}, []
+            for part in row["joints"]:
+                joint, axis = part["joint"].format(**letters), _AXES.index(part["axis"])
+                mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
+                middle, swing = (mirror * np.deg2rad(part[n]) for n in ("middle_deg", "swing_deg"))
+                phase = np.deg2rad(part.get("phase_deg", 0.0))
+                swings.append(Swing(joint, axis, middle, swing, tuple(part["hz"]), phase))
+            name, stance = (row[key].format(**letters) for key in ("name", "stance"))
+            movements.append(Movement(name, row["text"].format(**words), stance, tuple(swings)))
+    return tuple(movements)
 
 
 def possible(movement: Movement, person: Person) -> bool:

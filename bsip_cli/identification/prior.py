@@ -95,7 +95,12 @@ def prior_of(
     pairs = _pairs(names, fixed)
     own, alike = _own_spread(inertias, spread, names)
     readable = block_diag(*(readable_jacobian(part) for part in phi.reshape(-1, 10)))
-    together = _together(pairs, spread.left_right_correlation, alike)
+    # root of the correlation of all: a twin's is the mirrored one's, in what both sides share
+    together, rows = np.eye(len(phi)), np.arange(10)
+    for first, second in (10 * np.array(pair)[:, None] + rows for pair in pairs if len(pair) == 2):
+        shared = spread.left_right_correlation * alike[first] * alike[second]
+        together[second, first] = shared * _MIRROR
+        together[second, second] = np.sqrt(1 - shared**2)
     spread_root = np.linalg.solve(readable, own @ together)
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
     # once the sum of the free masses is known to that
@@ -131,24 +136,6 @@ def _pairs(names: tuple[str, ...], fixed: np.ndarray) -> tuple[tuple[int, ...], 
     return tuple(pairs)
 
 
-def _has_side(name: str) -> bool:
-    return name.endswith(("_l", "_r"))
-
-
-def _together(
-    pairs: tuple[tuple[int, ...], ...], correlation: float, alike: np.ndarray
-) -> np.ndarray:
-    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's,
-    in the parts ``alike`` (10 n,) of their standard deviations that both sides share."""
-    root = np.eye(len(alike))
-    for first, second in (pair for pair in pairs if len(pair) == 2):
-        rows = np.arange(10)
-        own = correlation * alike[10 * first + rows] * alike[10 * second + rows]
-        root[10 * second + rows, 10 * first + rows] = own * _MIRROR
-        root[10 * second + rows, 10 * second + rows] = np.sqrt(1 - own**2)
-    return root
-
-
 def _own_spread(
     inertias: tuple[Inertia, ...], spread: Spread, names: tuple[str, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -164,7 +151,7 @@ def _own_spread(
         products = np.sqrt([own[0] * own[1], own[0] * own[2], own[1] * own[2]])
         centre, part = com[i] * rod_length_m(inertia), moments[i]
         sd = np.r_[mass[i] * inertia.mass_kg, centre, part * own, 0.5 * part * products]
-        if not _has_side(name):
+        if mirrored(name) == name:
             sd[_SIDEWAYS] = min(sd[_SIDEWAYS], spread.midline_sd_m)
         if name in _EDITIONS_APART_M:
             sd[_FORWARDS] = np.hypot(sd[_FORWARDS], _EDITIONS_APART_M[name])

@@ -258,8 +258,19 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     """Noise from what a fit leaves, one series per recording."""
     residual = np.concatenate([one.residual for one in series])
     level = np.concatenate([one.noise_level for one in series])
-    fits = [_size_over_time(residual[:, c], level) for c in range(6)]
-    steady, with_level = np.array(fits).T
+    # standard deviations, steady and per level, of likely Gaussian residuals
+    terms = np.stack([np.ones_like(level), level**2], axis=1)
+    scale = np.maximum(terms.mean(axis=0), 1e-300)
+    terms, parts = terms / scale, np.empty((6, 2))
+    for c in range(6):
+        square = residual[:, c] ** 2
+        mean = max(float(square.mean()), 1e-18)
+        variance = np.full_like(square, mean)
+        for _ in range(_NOISE_ROUNDS):
+            parts[c], _ = nnls(terms / variance[:, None], square / variance)
+            parts[c, 0] = max(parts[c, 0], _QUIETEST**2 * mean)
+            variance = terms @ parts[c]
+    steady, with_level = np.sqrt(parts / [1.0, scale[1]]).T
     spread = np.sqrt(_variances(steady, with_level, level))
     ends = np.cumsum([len(one.residual) for one in series])
     spans = [(int(e - len(s.residual)), int(e)) for e, s in zip(ends, series, strict=True)]
@@ -267,21 +278,6 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     effective = np.clip(np.nan_to_num(counts, nan=1.0), 1.0, len(residual))
     rms = 1 / np.sqrt((1 / spread**2).mean(axis=0))
     return Noise(rms, effective, len(residual), steady, with_level)
-
-
-def _size_over_time(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
-    """Standard deviations (steady, per level) of likely Gaussian residuals (n,)."""
-    square = residual**2
-    mean = max(float(square.mean()), 1e-18)
-    terms = np.stack([np.ones_like(level), level**2], axis=1)
-    scale = np.maximum(terms.mean(axis=0), 1e-300)
-    variance = np.full_like(square, mean)
-    parts = np.array([mean, 0.0])
-    for _ in range(_NOISE_ROUNDS):
-        parts, _ = nnls(terms / scale / variance[:, None], square / variance)
-        parts[0] = max(parts[0], _QUIETEST**2 * mean)
-        variance = terms / scale @ parts
-    return float(np.sqrt(parts[0])), float(np.sqrt(parts[1] / scale[1]))
 
 
 def _variances(steady: np.ndarray, with_level: np.ndarray, level: np.ndarray) -> np.ndarray:

@@ -64,16 +64,6 @@ def _turn_quaternion(q, omega):
 
 
 @compiled
-def _rotation_vector(q, out):
-    """Rotation vector of a unit quaternion, by the shorter way."""
-    sign = 1.0 if q[3] >= 0 else -1.0
-    s = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
-    k = 2.0 if s < 1e-12 else 2.0 * np.arctan2(s, sign * q[3]) / s
-    for i in range(3):
-        out[i] = sign * k * q[i]
-
-
-@compiled
 def _hinge_rotation(u, angle, out):
     """Rotation by an angle about a unit axis (Rodrigues)."""
     c, s = np.cos(angle), np.sin(angle)
@@ -118,12 +108,17 @@ def forward(q, tree, R, p):
 
 @compiled
 def _angles(q, tree):
-    """(nv,) joint angles, which the prior pulls to zero; of the base, zeros."""
+    """(nv,) joint angles, which the prior pulls to zero; of the base, zeros. Of a unit quaternion
+    the rotation vector, by the shorter way."""
     angles = np.zeros(tree.v_segments.size)
     for i in range(1, tree.kinds.size):
         at, av = tree.q_starts[i], tree.v_starts[i]
         if tree.kinds[i] == SPHERICAL:
-            _rotation_vector(q[at : at + 4], angles[av : av + 3])
+            sign = 1.0 if q[at + 3] >= 0 else -1.0
+            s = np.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2)
+            k = 2.0 if s < 1e-12 else 2.0 * np.arctan2(s, sign * q[at + 3]) / s
+            for j in range(3):
+                angles[av + j] = sign * k * q[at + j]
         else:
             angles[av] = q[at]
     return angles

@@ -112,13 +112,20 @@ def find_level_change(
     if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
     problem = _Problem(y, columns, places, coefficient_sd)
-    correlation = 0.0
+    x = problem.of_x
+    X, square, correlation = problem.z[:, :x], problem.squares[:x, :x], 0.0
     error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
         found = _best(problem, correlation, error)
         if found is None:
             return None
-        correlation = _correlation(problem, found, error)
+        # of neighbours among what columns and step leave, fitted as if there were none
+        stepped = problem.z[:, x:].copy()
+        stepped[found.at :] -= found.step
+        left = stepped - X @ np.linalg.solve(square + problem.prior(error), X.T @ stepped)
+        power = float((left[:-1] ** 2).sum())
+        value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
+        correlation = float(np.clip(value, 0.0, _LARGEST_CORRELATION))
         error = max(found.spread * np.sqrt(1.0 - correlation**2), _LEAST_ERROR)
     return _best(problem, correlation, error)
 
@@ -152,19 +159,6 @@ def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | 
         spread=float(np.sqrt(variance / (1.0 - correlation**2))),
         z=float(np.sqrt(z2)),
     )
-
-
-def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
-    """Of neighbours among what columns and step leave, fitted as if there were none."""
-    x = problem.of_x
-    stepped = problem.z[:, x:].copy()
-    stepped[found.at :] -= found.step
-    X = problem.z[:, :x]
-    system = problem.squares[:x, :x] + problem.prior(error)
-    left = stepped - X @ np.linalg.solve(system, X.T @ stepped)
-    power = float((left[:-1] ** 2).sum())
-    value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
-    return float(np.clip(value, 0.0, _LARGEST_CORRELATION))
 
 
 # --- markers that are misplaced since the calibration, throughout a trial or from a moment on -----

@@ -236,8 +236,13 @@ def _on_manifold(
         elif count == 4:
             q[:, part], *found = _angular(s, part)
         else:  # of the base, whose turning is there already
-            turn, omega = q[:, part.stop : part.stop + 4], v[:, turning.stop : turning.stop + 3]
-            found = _linear(s, part, turn, omega)
+            # velocity and acceleration in its own axes (Pinocchio's spatial ones)
+            u, w = -q[:, part.stop : part.stop + 3], q[:, part.stop + 3 : part.stop + 4]
+            omega, in_body = v[:, turning.stop : turning.stop + 3], []
+            for vectors in (s.first[:, part], s.second[:, part]):
+                t = 2 * np.cross(u, vectors)
+                in_body.append(vectors + w * t + np.cross(u, t))
+            found = [in_body[0], in_body[1] - np.cross(omega, in_body[0]), s.second_sd[:, part]]
         v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 
@@ -261,13 +266,3 @@ def _imaginary(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(N, 3) vector part of conj(x) * y; quaternions as x, y, z, w."""
     u, w, p, r = x[:, :3], x[:, 3:], y[:, :3], y[:, 3:]
     return w * p - r * u - np.cross(u, p)
-
-
-def _linear(s: SmoothSignal, part: slice, quaternion: np.ndarray, omega: np.ndarray):
-    """Velocity and acceleration of the base in its own axes (Pinocchio's spatial ones)."""
-    u, w, in_body = -quaternion[:, :3], quaternion[:, 3:], []
-    for vectors in (s.first[:, part], s.second[:, part]):
-        t = 2 * np.cross(u, vectors)
-        in_body.append(vectors + w * t + np.cross(u, t))
-    velocity, acceleration = in_body
-    return velocity, acceleration - np.cross(omega, velocity), s.second_sd[:, part]

@@ -105,11 +105,15 @@ def smooth(
     first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
     penalty = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
+    # The skin's part has as much power at all frequencies that pass: the value's variance times it.
+    skins = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
     for columns in groups:
         weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
         right = basis.values.T @ (weights[:, None] * scaled[:, columns])
         c[:, columns], inverse = _fit(_normal(basis, weights), penalty, right)
-        spread[:, columns] = np.outer(_curve_sd(basis, penalty, inverse), sigma[columns])
+        white = _variances(basis.curves, inverse)
+        of_curve = np.sqrt(white + skins * _variances(basis.values, inverse))
+        spread[:, columns] = np.outer(of_curve, sigma[columns])
     c *= sigma
     return SmoothSignal(
         basis.values @ c + offset,
@@ -154,20 +158,17 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     density = (power[inside] / gain[:, None, None]).mean(axis=0)
     # The lower third of such a mean lies below it; a Hann window ties neighbouring frequencies.
     freedom = 2 * inside.sum() / 1.9
-    whole = _whole_windows(samples, (t * rate_hz - 0.5 * width).round().astype(int), width)
+    # Windows with bridged samples, whose noise is nil, count only where there are no others.
+    missing = np.concatenate([[0], np.cumsum(~np.isfinite(samples).all(axis=1))])
+    first = (t * rate_hz - 0.5 * width).round().astype(int)
+    last = np.minimum(first + width + _NOISE_ORDER, len(samples))
+    whole = missing[last] == missing[first]
+    whole |= not whole.any()
     level = np.sqrt(
         np.quantile(density[:, whole], 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
     )
     scale = np.abs(whole_curves).max(axis=0)
     return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
-
-
-def _whole_windows(samples: np.ndarray, first: np.ndarray, width: int) -> np.ndarray:
-    """Which windows hold no bridged sample, whose noise is nil; all of them where none does."""
-    missing = np.concatenate([[0], np.cumsum(~np.isfinite(samples).all(axis=1))])
-    last = np.minimum(first + width + _NOISE_ORDER, len(samples))
-    whole = missing[last] == missing[first]
-    return whole if whole.any() else np.ones(len(first), dtype=bool)
 
 
 def bridged(samples: np.ndarray) -> np.ndarray:
@@ -253,16 +254,6 @@ def _skin_share(stiffness: np.ndarray, basis: _Basis, skin: SkinNoise | None) ->
     corner, lowest = (2 * np.pi * f / basis.per_s for f in (skin.corner_hz, skin.from_hz))
     share = corner**4 / float(np.mean(1.0 / stiffness))
     return min(share, basis.samples_per_knot / lowest**4)
-
-
-def _curve_sd(basis: _Basis, penalty: _Penalty, inverse: np.ndarray) -> np.ndarray:
-    """(N,) sd of the second derivative over that of the white noise.
-
-    The skin's part has as much power at all frequencies that pass: the value's variance times it.
-    """
-    skin = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
-    white = _variances(basis.curves, inverse)
-    return np.sqrt(white + skin * _variances(basis.values, inverse))
 
 
 def _cutoff_hz(basis: _Basis, penalty: _Penalty) -> np.ndarray:

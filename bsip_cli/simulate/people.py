@@ -80,18 +80,6 @@ def nearest_physical(tensor: np.ndarray) -> np.ndarray:
     return tensor_of(axes @ np.diag(values) @ axes.T)
 
 
-def varied_tensor(tensor: np.ndarray, rng: np.random.Generator, share: float) -> np.ndarray:
-    """Another physical tensor; the mean of many is the given one.
-
-    It is that of equal points drawn from a normal distribution with the given second moments
-    (Wishart), so many that each moment has the relative standard deviation `share`. The axes of
-    a slender body turn little, those of a round one freely.
-    """
-    count = max(3, round(2.0 / share**2))
-    points = rng.standard_normal((count, 3)) @ np.linalg.cholesky(second_moments(tensor)).T
-    return tensor_of(points.T @ points / count)
-
-
 def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:
     """One body out of several that share their axes.
 
@@ -262,6 +250,12 @@ def _draw_inertias(
         if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
             com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
         tensor = np.outer(mirror, mirror) * row.tensor * own_mass * length**2
-        tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
+        if scale:
+            # Another physical tensor; the mean of many is this one. It is that of equal points
+            # drawn from a normal distribution with its second moments (Wishart), so many that each
+            # moment has this relative standard deviation. A slender body's axes turn little.
+            root = np.linalg.cholesky(second_moments(tensor))
+            points = rng.standard_normal((max(3, round(2.0 / (0.12 * scale) ** 2)), 3)) @ root.T
+            tensor = tensor_of(points.T @ points / len(points))
         inertias[body] = Inertia(own_mass, com, tensor)
     return inertias

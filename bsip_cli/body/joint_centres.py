@@ -40,16 +40,16 @@ _PELVIS = ("asis_l", "asis_r", "sacrum")
 
 def stood_in_for(known: Collection[str]) -> set[str]:
     """Names of the skin landmarks that the known centres can stand in for."""
+    if not set(_TRUNK) <= set(known):
+        return set()
     stand_ins = {
         f"{name}_{side}"
         for centre, names in _ACROSS.items()
         for side in "lr"
-        if f"{centre}_{side}" in known and set(_TRUNK) <= set(known)
+        if f"{centre}_{side}" in known
         for name in names
     }
-    if set(_TRUNK) <= set(known):
-        stand_ins |= {*_PELVIS, "acromion_l", "acromion_r"}
-    return stand_ins - set(known)
+    return {*stand_ins, *_PELVIS, "acromion_l", "acromion_r"} - set(known)
 
 
 def with_skin(

@@ -247,7 +247,8 @@ class Fit:
 def terms_of(problem: Problem) -> Terms:
     """Normal equations and priors of a problem, about the table's values."""
     prior = problem.prior
-    information, right = problem.trusted_with_instruments()
+    equations = problem.jointly or problem.equations
+    information, right = equations.weighted(problem.noise.weights() / problem.trust_ratio**2)
     size, beyond = len(prior.phi), len(right) - len(prior.phi)
     every = tuple(range(len(prior.inertias)))
     groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]

@@ -316,11 +316,6 @@ class Problem:
         """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
         return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
-    def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
-        equations = self.jointly or self.equations
-        return equations.weighted(self.noise.weights() / self.trust_ratio**2)
-
 
 @dataclass(frozen=True, eq=False)
 class Estimate:

@@ -131,7 +131,12 @@ def smooth_motion(
     joint_of_curve = np.repeat(
         np.arange(len(skeleton.joints)), np.diff([*skeleton.q_starts, q.shape[1]])
     )
-    curves = np.where(known[:, joint_of_curve], _continuous(skeleton, q), np.nan)
+    smooth_q = q.copy()
+    for part in _quaternions(skeleton):  # signs chosen so that they do not jump
+        x = smooth_q[:, part]
+        signs = np.sign(np.einsum("fi,fi->f", x[1:], x[:-1]))
+        x[1:] *= np.cumprod(np.where(signs == 0, 1.0, signs))[:, None]
+    curves = np.where(known[:, joint_of_curve], smooth_q, np.nan)
     marker_noise, noise = _noise(person, curves, whole, rate_hz)
     if method == "spline":
         pose_known = np.where(whole[:, None, None], markers, np.nan)
@@ -189,16 +194,6 @@ def _blocks(skeleton: Skeleton) -> Iterator[tuple[slice, slice, int, float]]:
             yield slice(at, at + 4), slice(av, av + 3), 4, 2.0
         else:
             yield slice(at, at + 1), slice(av, av + 1), 1, 1.0
-
-
-def _continuous(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    """q with the quaternions' signs chosen so that they do not jump."""
-    out = q.copy()
-    for part in _quaternions(skeleton):
-        x = out[:, part]
-        signs = np.sign(np.einsum("fi,fi->f", x[1:], x[:-1]))
-        x[1:] *= np.cumprod(np.where(signs == 0, 1.0, signs))[:, None]
-    return out
 
 
 def _quaternions(skeleton: Skeleton) -> list[slice]:

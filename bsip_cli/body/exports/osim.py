@@ -211,13 +211,21 @@ def check_fits(model: GivenModel, body_map: BodyMap) -> None:
             )
     for group in body_map.groups:
         placed = _placements(model, group)
-        for segment, body in group.joints:
-            if not {body, model.joints[body].parent} & set(placed):
-                raise _bad_group(model, group, f"{body} ({segment}) is no joint of these bodies")
+        faults = [
+            f"{body} ({segment}) is no joint of these bodies"
+            for segment, body in group.joints
+            if not {body, model.joints[body].parent} & set(placed)
+        ]
         if set(placed) != set(group.bodies):
-            raise _bad_group(model, group, "its bodies are not joined to each other")
+            faults.append("its bodies are not joined to each other")
         if sum(model.masses_kg[body] for body in group.bodies) <= 0:
-            raise _bad_group(model, group, "its bodies have no mass to share by")
+            faults.append("its bodies have no mass to share by")
+        if faults:
+            raise UsageError(
+                f"group {', '.join(group.bodies)}: {faults[0]}",
+                file=model.file,
+                remedy="correct the map of bodies",
+            )
 
 
 def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson) -> Replacement:
@@ -298,14 +306,6 @@ def _placements(model: GivenModel, group: BodyGroup) -> dict[str, pin.SE3]:
             elif joint.child in placed:
                 placed[joint.parent] = placed[joint.child] * across.inverse()
     return placed
-
-
-def _bad_group(model: GivenModel, group: BodyGroup, found: str) -> UsageError:
-    return UsageError(
-        f"group {', '.join(group.bodies)}: {found}",
-        file=model.file,
-        remedy="correct the map of bodies",
-    )
 
 
 def _joint(element: ET.Element) -> GivenJoint:

@@ -48,7 +48,6 @@ def visual3d_csv_text(body: IdentifiedPerson) -> str:
 
 
 def _row(body: IdentifiedPerson, i: int, inertia: Inertia) -> dict[str, Any]:
-    """Column to value of segment ``i``."""
     skeleton, length = body.person.skeleton, body.person.lengths_m[i]
     lies = skeleton.table_rows[i] == "foot"
     turn = _LYING if lies else _UPRIGHT

@@ -338,7 +338,6 @@ class MarkerSwap(Effect, name="marker_swap"):
         return cls(size, first, second, number, share, target.settings.get("start_s"))
 
     def _pair(self, instruments: Instruments) -> tuple[int, int]:
-        """The columns of the two markers."""
         if self.first:
             return instruments.column(self.first), instruments.column(self.second)
         points = np.nanmedian(instruments.points_m, axis=0)

@@ -136,7 +136,6 @@ def _sketch(person: Person, gait: Gait, duration_s: float) -> Sketch:
 
 
 def _move_foot(sketch: Sketch, gait: Gait, side: str) -> None:
-    """One foot's stances and swings."""
     t, foot, stance = sketch.t_s, sketch.feet[side], gait.stance_s
     length = sketch.person.lengths_m[f"foot_{side}"]
     own = [k for k in STEPS if gait.side_of(k) == side]

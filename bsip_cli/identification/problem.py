@@ -51,10 +51,6 @@ _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
 
 
-def _alike(noise_level: np.ndarray) -> np.ndarray:
-    return np.ones((len(noise_level), 6))
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Motion and measured wrench of one trial.
@@ -140,7 +136,7 @@ def accumulate(
     recordings: list[Recording],
     cutoff_hz: float,
     reference_m: np.ndarray,
-    weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
+    weights_at: Callable[[np.ndarray], np.ndarray] | None = None,
     instruments: Instruments | None = None,
 ) -> NormalEquations:
     """Both sides of the equations through the same low-pass, decimated, weighted and summed.
@@ -154,7 +150,9 @@ def accumulate(
     for recording in recordings:
         blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, instruments)
         for regressor, wrench, noise_level in blocks:
-            root = np.sqrt(weights_at(noise_level))
+            root = np.ones((len(wrench), 6))
+            if weights_at is not None:
+                root = np.sqrt(weights_at(noise_level))
             measured = root * wrench
             for c in range(6):
                 rows = root[:, c, None] * regressor[:, c]

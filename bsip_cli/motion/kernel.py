@@ -259,51 +259,37 @@ def _bend(d, w, sums, tree, N, H):
 
 
 @compiled
-def _factor(H, damping, v_parents, L):
+def _factor(H, damping, L):
     """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
 
     Returns whether the matrix is positive definite.
     """
-    definite = True
-    nv = v_parents.size
+    definite, nv = True, len(H)
+    L[:] = H
     for k in range(nv):
-        a = k
-        while a >= 0:
-            L[k, a] = H[k, a]
-            a = v_parents[a]
         L[k, k] += damping * H[k, k] + 1e-12
     for k in range(nv - 1, -1, -1):
         definite &= L[k, k] > 0
         L[k, k] = np.sqrt(max(L[k, k], 1e-12))
-        i = v_parents[k]
-        while i >= 0:
+        for i in range(k):
             L[k, i] /= L[k, k]
-            i = v_parents[i]
-        i = v_parents[k]
-        while i >= 0:
-            j = i
-            while j >= 0:
-                L[i, j] -= L[k, i] * L[k, j]
-                j = v_parents[j]
-            i = v_parents[i]
+        for i in range(k):
+            if L[k, i] != 0.0:
+                for j in range(i + 1):
+                    L[i, j] -= L[k, i] * L[k, j]
     return definite
 
 
 @compiled
-def _solve(L, v_parents, x):
+def _solve(L, x):
     """x <- (L^T L)^-1 x."""
-    nv = v_parents.size
-    for i in range(nv - 1, -1, -1):
+    for i in range(len(x) - 1, -1, -1):
         x[i] /= L[i, i]
-        j = v_parents[i]
-        while j >= 0:
+        for j in range(i):
             x[j] -= L[i, j] * x[i]
-            j = v_parents[j]
-    for i in range(nv):
-        j = v_parents[i]
-        while j >= 0:
+    for i in range(len(x)):
+        for j in range(i - 1, -1, -1):
             x[i] -= L[i, j] * x[j]
-            j = v_parents[j]
         x[i] /= L[i, i]
 
 
@@ -347,10 +333,10 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         if newton:
             _bend(d, w, sums, tree, N, H)
         while damping < 1e6:
-            definite = _factor(H, damping, tree.v_parents, L)
+            definite = _factor(H, damping, L)
             if definite or not newton:
                 dv[:] = g
-                _solve(L, tree.v_parents, dv)
+                _solve(L, dv)
                 _step(q, dv, tree, base, trial)
                 trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
                 if trial_cost <= cost * (1 + 1e-14):
@@ -372,7 +358,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
             taken = step + 1
             break
     _assemble(d, w, sums, q, tree, task, H, g)
-    _factor(H, 0.0, tree.v_parents, L)
+    _factor(H, 0.0, L)
     return taken
 
 

@@ -133,7 +133,15 @@ def jumps(
     same frame (at an impact all shake), and of the noise; half of it comes or goes within two
     frames, and the measured path shows it.
     """
-    away = _away(residual, 2 * max(2, round(0.5 * _WINDOW_S / fit.step_s())) + 1)
+    longest, away = round(0.5 * _WINDOW_S / fit.step_s()), np.full(residual.shape, np.nan)
+    width = 2 * max(2, longest) + 1  # of the running median over the visible frames
+    for m in range(residual.shape[1]):
+        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
+        if len(seen) >= _LEAST_FRAMES:
+            window = min(width, len(seen) | 1)
+            for axis in range(residual.shape[2]):  # one-dimensional, it costs a tenth
+                own = residual[seen, m, axis]
+                away[seen, m, axis] = own - median_filter(own, size=window, mode="nearest")
     distance = np.linalg.norm(away, axis=2)
     astray = np.zeros(distance.shape, dtype=bool)
     if not np.isfinite(distance).any():
@@ -143,7 +151,6 @@ def jumps(
     spread = np.maximum(np.maximum(own, frame), fit.noise_m())
     with np.errstate(invalid="ignore"):
         beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
-    longest = round(0.5 * _WINDOW_S / fit.step_s())
     found = []
     for m in range(len(fit.labels)):
         for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
@@ -182,19 +189,6 @@ def _own(
         dragged = [x for x in together if not missed[x[0]] > _SAME * distance[peak, x[0]]]
         left = [one for one in left if one is not source and one not in dragged]
     return own
-
-
-def _away(residual: np.ndarray, width: int) -> np.ndarray:
-    """Residual less its running median over the visible frames, NaN where missing."""
-    away = np.full(residual.shape, np.nan)
-    for m in range(residual.shape[1]):
-        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
-        if len(seen) >= _LEAST_FRAMES:
-            size = min(width, len(seen) | 1)
-            for axis in range(residual.shape[2]):  # one-dimensional, it costs a tenth
-                own = residual[seen, m, axis]
-                away[seen, m, axis] = own - median_filter(own, size=size, mode="nearest")
-    return away
 
 
 def _median(distance: np.ndarray, axis: int) -> np.ndarray:

@@ -190,19 +190,16 @@ class _Basis:
         self.intervals = max(int(np.ceil(self.x[-1])), 1)
         self.per_s = rate_hz / samples_per_knot
         self.size = self.intervals + _DEGREE
-        self.values, self.slopes, self.curves = map(self._derivative, range(3))
-
-    def _derivative(self, order: int) -> sparse.csr_array:
-        """Basis of degree 5 - order on the same knots, times the differences of that order."""
-        degree = _DEGREE - order
-        knots = np.arange(-degree, self.intervals + degree + 1, dtype=float)
-        basis = sparse.csr_array(BSpline.design_matrix(self.x, knots, degree))
-        signs = {0: [1.0], 1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0]}[order]
-        size = self.size - order
-        differences = sparse.diags_array(
-            [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
-        )
-        return sparse.csr_array(basis @ differences) * self.per_s**order
+        matrices = []  # basis of degree 5 - order on the same knots, times differences of an order
+        for order, signs in enumerate(([1.0], [-1.0, 1.0], [1.0, -2.0, 1.0])):
+            degree, size = _DEGREE - order, self.size - order
+            knots = np.arange(-degree, self.intervals + degree + 1, dtype=float)
+            basis = sparse.csr_array(BSpline.design_matrix(self.x, knots, degree))
+            differences = sparse.diags_array(
+                [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
+            )
+            matrices.append(sparse.csr_array(basis @ differences) * self.per_s**order)
+        self.values, self.slopes, self.curves = matrices
 
     def power(self, omega: np.ndarray) -> np.ndarray:
         """Gain of B^T B far from the ends at these frequencies (radians per knot)."""

@@ -284,6 +284,23 @@ class Sketch:
 
     def plan(self, **options: Any) -> Plan:
         """Freeze the sketch; `options` are further fields of `Plan`."""
+        feet = {}
+        for side, foot in self.feet.items():  # as the path of its ankle, and its frame
+            length = self.person.lengths_m[f"foot_{side}"]
+            toe_turn, heel_turn = about_z(-foot.toe_roll_rad), about_z(foot.heel_roll_rad)
+            ankle = np.broadcast_to([0.0, self.person.ankle_height_m, 0.0], foot.raised_m.shape)
+            for share, turn in ((TOE_SHARE, toe_turn), (HEEL_SHARE, heel_turn)):
+                pivot = np.array([share * length, 0.0, 0.0])
+                ankle = pivot + rotate(turn, ankle - pivot)
+            yaw = about_y(np.full(1, -SIDE_SIGN[side] * TOE_OUT_RAD))[0]
+            base = np.stack([foot.ahead_m, np.zeros_like(foot.ahead_m), foot.aside_m], axis=1)
+            feet[side] = Foot(
+                position_m=base + foot.raised_m + rotate(yaw, ankle),
+                rotation=yaw @ heel_turn @ toe_turn @ euler_zxy(foot.tilt_rad),
+                share=foot.share,
+                cop_m=base[:, [0, 2]] + yaw[[0, 2], 0] * foot.cop_ahead_m[:, None],
+                on_plate=foot.on_plate,
+            )
         start = self.sample_of(self.recorded_s[0])
         samples = round((self.recorded_s[1] - self.recorded_s[0]) / STEP_S)
         return Plan(
@@ -291,28 +308,9 @@ class Sketch:
             angles_rad=self.angles,
             pelvis_angles_rad=self.pelvis_angles,
             pelvis_m=self.pelvis_m,
-            feet={side: self._foot(side) for side in SIDES},
+            feet=feet,
             keep=slice(start, start + samples),
             **options,
-        )
-
-    def _foot(self, side: str) -> Foot:
-        """The sketched foot as a path of its ankle and frame."""
-        foot = self.feet[side]
-        length = self.person.lengths_m[f"foot_{side}"]
-        toe_turn, heel_turn = about_z(-foot.toe_roll_rad), about_z(foot.heel_roll_rad)
-        ankle = np.broadcast_to([0.0, self.person.ankle_height_m, 0.0], foot.raised_m.shape)
-        for share, turn in ((TOE_SHARE, toe_turn), (HEEL_SHARE, heel_turn)):
-            pivot = np.array([share * length, 0.0, 0.0])
-            ankle = pivot + rotate(turn, ankle - pivot)
-        yaw = about_y(np.full(1, -SIDE_SIGN[side] * TOE_OUT_RAD))[0]
-        base = np.stack([foot.ahead_m, np.zeros_like(foot.ahead_m), foot.aside_m], axis=1)
-        return Foot(
-            position_m=base + foot.raised_m + rotate(yaw, ankle),
-            rotation=yaw @ heel_turn @ toe_turn @ euler_zxy(foot.tilt_rad),
-            share=foot.share,
-            cop_m=base[:, [0, 2]] + yaw[[0, 2], 0] * foot.cop_ahead_m[:, None],
-            on_plate=foot.on_plate,
         )
 
 

@@ -176,7 +176,15 @@ def marker_paths(
         if richness.soft_tissue:
             segment = "upper_torso" if marker.body == "thorax" else marker.body
             late = _late(marker, person.tissue.get(segment), path, rate_hz)
-            path = path + _skin_travel(label, marker, poses) + late
+            # over its bone a marker travels as a smooth function of the nearby joints
+            own, side = poses.rotation[marker.body], marker.body[-2:]
+            tissue = tissue_of(without_side(marker.body))
+            first, second = (tissue[end].replace("*", side) for end in ("proximal", "distal"))
+            bodies = (first, MOVED_BY_THE_ARM.get(label, second))
+            turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
+            sines = np.concatenate(turns, axis=1)
+            travel = rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
+            path = path + travel + late
         white = richness.marker_noise_m * rng.standard_normal(path.shape)
         width = DRIFT_SMOOTHING_S * rate_hz
         slow = gaussian_filter1d(rng.standard_normal(path.shape), width, axis=0, mode="reflect")
@@ -184,17 +192,6 @@ def marker_paths(
         gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
         paths[label] = path + (white + richness.marker_drift_m * gain * slow)
     return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
-
-
-def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
-    """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
-    own, side = poses.rotation[marker.body], marker.body[-2:]
-    tissue = tissue_of(without_side(marker.body))
-    first, second = (tissue[end].replace("*", side) for end in ("proximal", "distal"))
-    bodies = (first, MOVED_BY_THE_ARM.get(label, second))
-    turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
-    sines = np.concatenate(turns, axis=1)
-    return rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
 
 
 def _late(marker: Marker, swing: Swing | None, path: np.ndarray, rate_hz: float) -> np.ndarray:

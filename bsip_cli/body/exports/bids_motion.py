@@ -9,22 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.exports.identified import export_words
 from bsip_cli.body.exports.opensim_motion import coordinates
 from bsip_cli.body.skeleton import Skeleton
 
 TRACKSYS = "bsip"
-_FRAMES = {
-    "global": {
-        "SpatialAxes": "__S",
-        "RotationRule": "right-hand",
-        "Description": "Z up; X and Y of the laboratory",
-    },
-    "joint": {
-        "RotationRule": "right-hand",
-        "Description": "of the distal segment in the proximal one: z about Z (to the right) of the "
-        "proximal one, then x (anterior), then y along the distal one; hinges about their own axis",
-    },
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +90,7 @@ def channels_tsv(columns: Sequence[Channel]) -> str:
 
 def channels_json() -> str:
     """What the reference frames are."""
-    return _json({"reference_frame": {"Levels": _FRAMES}})
+    return _json({"reference_frame": {"Levels": export_words()["bids_reference_frames"]}})
 
 
 def motion_json(columns: Sequence[Channel], task: str, rate_hz: float, version: str) -> str:

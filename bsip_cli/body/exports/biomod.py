@@ -9,17 +9,11 @@ import numpy as np
 from bsip_cli.body.exports.identified import BALL_AXES, IdentifiedPerson, numbers
 from bsip_cli.body.gravity import GRAVITY_M_S2
 
-_NOTES = (
-    "SI units, Z up. Segment frames: origin at the joint to the parent, axes of the segment (X",
-    "anterior, Y up, Z right); the inertia is about the centre of mass. 'base' only translates,",
-    "a segment called like a joint only turns about its hinge.",
-)
-
 
 def biomod_text(body: IdentifiedPerson) -> str:
     """A bioMod file, version 4; errors as of `check_bodies` and `markers`."""
     body.check_bodies()
-    lines = ["version 4", *(f"// {line}" for line in (*body.made_of, *_NOTES)), ""]
+    lines = ["version 4", *(f"// {line}" for line in body.said("biomod")), ""]
     lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
     lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
     for i in range(len(body.person.skeleton.segments)):

@@ -43,10 +43,6 @@ COORDINATES = {
 (flexion), X after that turn, and Y of the segment."""
 _KINDS = ("Body", "Joint", "Marker")
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-_NOTES = (
-    "SI units, Y up. Body frames: origin at the joint to the parent, axes of the segment (X",
-    "anterior, Y up, Z right). No muscles, no geometry, no limits.",
-)
 
 
 def osim_text(body: IdentifiedPerson) -> str:
@@ -54,7 +50,7 @@ def osim_text(body: IdentifiedPerson) -> str:
     `markers`."""
     body.check_bodies()
     document = ET.Element("OpenSimDocument", Version="40000")
-    document.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    document.append(ET.Comment(xml_comment(body.said("osim"))))
     model = ET.SubElement(document, "Model", name=body.name)
     ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
     sets = (ET.SubElement(model, f"{kind}Set", name=f"{kind}set".lower()) for kind in _KINDS)

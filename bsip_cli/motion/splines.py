@@ -101,13 +101,15 @@ def smooth(
     seen = np.isfinite(samples)
     offset = np.nanmean(samples, axis=0)
     scaled = (bridged(samples) - offset) / sigma
-    groups = _alike(seen)
-    first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
+    groups: dict[bytes, list[int]] = {}  # channels that miss the same samples, together
+    for k in range(samples.shape[1]):
+        groups.setdefault(seen[:, k].tobytes(), []).append(k)
+    first = max(groups.values(), key=lambda columns: seen[:, columns[0]].sum())
     penalty = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
     # The skin's part has as much power at all frequencies that pass: the value's variance times it.
     skins = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
-    for columns in groups:
+    for columns in groups.values():
         weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
         right = basis.values.T @ (weights[:, None] * scaled[:, columns])
         c[:, columns], inverse = _fit(_normal(basis, weights), penalty, right)
@@ -122,14 +124,6 @@ def smooth(
         spread,
         _cutoff_hz(basis, penalty),
     )
-
-
-def _alike(seen: np.ndarray) -> list[list[int]]:
-    """Channels (columns) that miss the same samples, together."""
-    groups: dict[bytes, list[int]] = {}
-    for k in range(seen.shape[1]):
-        groups.setdefault(seen[:, k].tobytes(), []).append(k)
-    return list(groups.values())
 
 
 def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:

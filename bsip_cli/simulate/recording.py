@@ -117,12 +117,17 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
     keep = plan.keep
     wrench = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
     force, moment = (part[keep] for part in wrench)
-    planned, feet_force, feet_moment = plan.cop_m()[keep], {}, {}
+    planned, feet_force, feet_moment, contacts = plan.cop_m()[keep], {}, {}, []
     for side, foot in plan.feet.items():
         share, aside = foot.share[keep, None], foot.cop_m[keep] - planned
         lever = np.stack([aside[:, 0], np.zeros(len(aside)), aside[:, 1]], axis=1)
         feet_force[side] = share * force
         feet_moment[side] = share * moment + np.cross(lever, feet_force[side])
+        for part in runs(foot.share[keep] > 1e-9):  # the loaded intervals
+            start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
+            ahead, across = foot.cop_m[keep][part].mean(axis=0).tolist()
+            is_on = bool(foot.on_plate[keep][part].any())
+            contacts.append(Contact(side, start, end, is_on, (ahead, across)))
     return Trial(
         time_s=np.arange(keep.stop - keep.start) * STEP_S,
         poses=poses.part(keep),
@@ -131,21 +136,9 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
         feet_force_n=feet_force,
         feet_moment_nm=feet_moment,
         on_plate={side: foot.on_plate[keep] for side, foot in plan.feet.items()},
-        contacts=_contacts(plan),
+        contacts=tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side))),
         plan=plan,
     )
-
-
-def _contacts(plan: Plan) -> tuple[Contact, ...]:
-    """The loaded intervals of each foot within the recording, in order of time."""
-    contacts = []
-    for side, foot in plan.feet.items():
-        share, cop, on_plate = (a[plan.keep] for a in (foot.share, foot.cop_m, foot.on_plate))
-        for part in runs(share > 1e-9):
-            start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
-            ahead, aside = cop[part].mean(axis=0).tolist()
-            contacts.append(Contact(side, start, end, bool(on_plate[part].any()), (ahead, aside)))
-    return tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side)))
 
 
 # --- markers --------------------------------------------------------------------------------------

@@ -146,8 +146,8 @@ def jumps(
     astray = np.zeros(distance.shape, dtype=bool)
     if not np.isfinite(distance).any():
         return [], astray
-    own = _median(distance, 0)[None] / MEDIAN_LENGTH
-    frame = _median(distance, 1)[:, None] / MEDIAN_LENGTH
+    own = _median(distance, 0) / MEDIAN_LENGTH
+    frame = _median(distance, 1) / MEDIAN_LENGTH
     spread = np.maximum(np.maximum(own, frame), fit.noise_m())
     with np.errstate(invalid="ignore"):
         beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
@@ -192,11 +192,9 @@ def _own(
 
 
 def _median(distance: np.ndarray, axis: int) -> np.ndarray:
-    seen = np.isfinite(distance).any(axis=axis)
-    out = np.zeros(len(seen))
-    kept = distance[:, seen] if axis == 0 else distance[seen]
-    out[seen] = np.nanmedian(kept, axis=axis)
-    return out
+    """Along an axis, which stays; 0 where nothing is known."""
+    seen = np.isfinite(distance).any(axis=axis, keepdims=True)
+    return np.nanmedian(np.where(seen, distance, 0.0), axis=axis, keepdims=True)
 
 
 def _is_own(fit: MarkerFit, m: int, piece: slice, distance: np.ndarray) -> bool:

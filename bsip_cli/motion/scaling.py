@@ -132,15 +132,15 @@ def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Po
     return concatenated(parts)
 
 
-def _frame_weight(frames: int, options: ScalingOptions) -> float:
-    return min(1.0, options.independent_frames / frames)
-
-
 def _total_cost(poses, person, x, precision, options, ik) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
     far = np.maximum(d, limit)
     loss = np.where(d <= limit, 0.5 * d**2, limit**2 * (0.5 + np.log(far / limit)))
-    weights = person.marker_weights / ik["marker_sd_m"] ** 2 * _frame_weight(len(d), options)
+    weights = (
+        person.marker_weights
+        / ik["marker_sd_m"] ** 2
+        * min(1.0, options.independent_frames / len(d))
+    )
     return float((loss * weights).sum() + 0.5 * x @ precision @ x)
 
 
@@ -264,7 +264,7 @@ def _reduced_equations(
     distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
     trust = np.minimum(1.0, ik["robust_limit_m"] / np.maximum(distance, 1e-12)) ** 2
     base = person.marker_weights / ik["marker_sd_m"] ** 2
-    root = np.sqrt(trust * base * _frame_weight(len(poses.q), options))[..., None]
+    root = np.sqrt(trust * base * min(1.0, options.independent_frames / len(poses.q)))[..., None]
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
     below = subtrees(person)
     by_pose = pose_columns(tree, R, p, model, below) * root[..., None]

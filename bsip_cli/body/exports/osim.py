@@ -400,8 +400,7 @@ def shipped_names() -> tuple[str, ...]:
 def fitting_map(bodies: Iterable[str]) -> BodyMap | None:
     """The shipped map that fits a model with these bodies and explains most of them."""
     known = set(bodies)
-    maps = [load_body_map(name) for name in shipped_names()]
-    fitting = [each for each in maps if each.bodies() <= known]
+    fitting = (each for each in map(load_body_map, shipped_names()) if each.bodies() <= known)
     return max(fitting, key=lambda each: len(each.bodies()), default=None)
 
 

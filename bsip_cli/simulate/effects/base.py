@@ -83,8 +83,7 @@ class Effect:
         cls.choices = row["choices"].format(**{k: " ".join(x) for k, x in every.items()}).split()
         cls.settings, cls.needs = row["settings"].split(), row["needs"].split()
         cls.spares_static, cls.injectable = (
-            row["spares_static"] == "yes",
-            row["injectable"] == "yes",
+            row[k] == "yes" for k in ("spares_static", "injectable")
         )
         cls.personal = row["drawn_for"] == "person"
 

@@ -306,13 +306,13 @@ def fit_with_weights(terms: Terms) -> Fit:
         for _ in range(_ROUNDS):
             x, old = fit.optimum.x, fit.weights.spread
             removed, count = fit.prior_covariance - fit.optimum.covariance, terms.spread_weight
-            new = np.array(
+            new = np.array(  # MacKay's rule
                 [
                     (count + max(weight * np.sum(removed * precision), 0.0))
                     / (count + x @ precision @ x)
                     for weight, precision in zip(old, terms.spreads, strict=True)
                 ]
-            )  # MacKay's rule
+            )
             new = np.clip(new, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
             new[_NEVER_WIDER] = np.maximum(new[_NEVER_WIDER], 1.0)
             fit = fit_at(terms, Weights(new, gamma), fit)

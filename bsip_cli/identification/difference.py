@@ -68,10 +68,8 @@ def change_of_segments(a: Problem, b: Problem, segments: Sequence[int]) -> Segme
     shares its mass. Both problems need the same prior.
     """
     (information_a, right_a), (information_b, right_b) = (p.trusted_equations() for p in (a, b))
-    right_a, right_b = (
-        right - information @ p.prior.phi  # of deviations from the table
-        for p, right, information in ((a, right_a, information_a), (b, right_b, information_b))
-    )
+    right_a = right_a - information_a @ a.prior.phi  # of deviations from the table
+    right_b = right_b - information_b @ b.prior.phi
     part = (10 * np.asarray(segments)[:, None] + np.arange(10)).ravel()
     root = a.prior.root
     inner = np.eye(root.shape[1]) + root.T @ (information_a + information_b) @ root

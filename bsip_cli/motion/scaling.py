@@ -136,11 +136,8 @@ def _total_cost(poses, person, x, precision, options, ik) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
     far = np.maximum(d, limit)
     loss = np.where(d <= limit, 0.5 * d**2, limit**2 * (0.5 + np.log(far / limit)))
-    weights = (
-        person.marker_weights
-        / ik["marker_sd_m"] ** 2
-        * min(1.0, options.independent_frames / len(d))
-    )
+    frame_weight = min(1.0, options.independent_frames / len(d))
+    weights = person.marker_weights / ik["marker_sd_m"] ** 2 * frame_weight
     return float((loss * weights).sum() + 0.5 * x @ precision @ x)
 
 

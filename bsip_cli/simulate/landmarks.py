@@ -112,9 +112,8 @@ def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
     for row in table("tissue.csv"):
         for segment in row["swings"].split():
             frequency = float(rng.uniform(float(row["from_hz"]), float(row["to_hz"])))
-            swings[segment] = Swing(
-                float(row["share"]), frequency, float(rng.uniform(*DAMPING_RATIO))
-            )
+            damping = float(rng.uniform(*DAMPING_RATIO))
+            swings[segment] = Swing(float(row["share"]), frequency, damping)
     return swings
 
 

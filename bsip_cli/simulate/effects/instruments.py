@@ -337,18 +337,15 @@ class MarkerSwap(Effect, name="marker_swap"):
         number, share = int(rng.integers(CLOSE_PAIRS)), float(rng.uniform(0.2, 0.8))
         return cls(size, first, second, number, share, target.settings.get("start_s"))
 
-    def _pair(self, instruments: Instruments) -> tuple[int, int]:
-        if self.first:
-            return instruments.column(self.first), instruments.column(self.second)
-        points = np.nanmedian(instruments.points_m, axis=0)
-        distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-        distance[np.tril_indices(len(points))] = np.inf
-        flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
-        a, b = np.unravel_index(flat, distance.shape)
-        return int(a), int(b)
-
     def measured(self, instruments: Instruments) -> Instruments:
-        a, b = self._pair(instruments)
+        if self.first:
+            a, b = instruments.column(self.first), instruments.column(self.second)
+        else:
+            points = np.nanmedian(instruments.points_m, axis=0)
+            distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+            distance[np.tril_indices(len(points))] = np.inf
+            flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
+            a, b = map(int, np.unravel_index(flat, distance.shape))
         times = instruments.frame_times_s()
         free = max(times[-1] - self.size, 0.0)
         start = self.start_share * free if self.start_s is None else self.start_s

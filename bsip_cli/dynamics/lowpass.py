@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.ndimage import find_objects, label
 
 _REACH = 4.0  # standard deviations at which the kernel ends
 
 
 def valid_intervals(valid: np.ndarray) -> list[tuple[int, int]]:
     """Half-open index ranges of the runs of True."""
-    return [(run.start, run.stop) for (run,) in find_objects(label(valid)[0])]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], valid.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def stride_to(rate_hz: float, enough_hz: float) -> int:

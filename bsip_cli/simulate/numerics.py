@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polyval
 from scipy.interpolate import make_interp_spline
-from scipy.ndimage import find_objects, label
 from scipy.signal import cont2discrete, lfilter
 from scipy.special import ndtr
 
@@ -120,7 +119,8 @@ def response(
 
 def runs(mask: np.ndarray) -> list[slice]:
     """The intervals of samples where the mask (T,) holds."""
-    return [interval for (interval,) in find_objects(label(mask)[0])]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def bridge(start: np.ndarray, end: np.ndarray, duration_s: float, t_s: np.ndarray) -> np.ndarray:

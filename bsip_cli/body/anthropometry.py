@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -55,15 +55,33 @@ def load_table(name: str) -> dict[tuple[str, str], TableRow]:
         rows |= {
             (sex, "torso"): _torso(parts[sex, "thorax"], parts[sex, "abdomen"]) for sex in "MF"
         }
-    in_both = [segment for sex, segment in rows if sex == "M" and ("F", segment) in rows]
-    means = {(OTHER, one): _mean(rows["M", one], rows["F", one]) for one in in_both}
-    return rows | means
+    # halfway between two rows; of two tensors that a body can have the mean is one as well
+    for segment in [one for sex, one in rows if sex == "M" and ("F", one) in rows]:
+        both = (vars(rows[sex, segment]).values() for sex in "MF")
+        means = ((mine + theirs) / 2 for mine, theirs in zip(*both, strict=True))
+        rows[OTHER, segment] = TableRow(*means)
+    return rows
 
 
 def _rows_of(name: str) -> dict[tuple[str, str], TableRow]:
-    file = Path(__file__).parent / "tables" / f"{name}.csv"
+    file, rows = Path(__file__).parent / "tables" / f"{name}.csv", {}
     lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
-    return {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+    for row in csv.DictReader(lines):
+        radii = [[row[f"r{min(a, b)}{max(a, b)}_pct"] for b in "xyz"] for a in "xyz"]
+        com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
+        rows[row["sex"], row["segment"]] = TableRow(
+            float(row["mass_percent"]) / 100,
+            com,
+            np.array([[_signed_square(radius) for radius in line] for line in radii]),
+            float(row["mean_length_mm"]) / 1000,
+        )
+    return rows
+
+
+def _signed_square(radius_pct: str) -> float:
+    """A radius of gyration with an i behind it has a negative square."""
+    radius = float(radius_pct.rstrip("i")) / 100
+    return -radius * radius if radius_pct.endswith("i") else radius * radius
 
 
 def _torso(thorax: TableRow, abdomen: TableRow) -> TableRow:
@@ -77,24 +95,6 @@ def _torso(thorax: TableRow, abdomen: TableRow) -> TableRow:
     whole = from_phi(np.sum([body.phi() for body in bodies], axis=0))
     gyration = whole.tensor_kgm2 / (whole.mass_kg * length**2)
     return TableRow(whole.mass_kg, whole.com_m / length, gyration, length)
-
-
-def _mean(one: TableRow, other: TableRow) -> TableRow:
-    """Halfway between two rows; of two tensors that a body can have the mean is one as well."""
-    pairs = zip(vars(one).values(), vars(other).values(), strict=True)
-    return TableRow(*((mine + theirs) / 2 for mine, theirs in pairs))
-
-
-def _row(row: dict[str, str]) -> TableRow:
-    """A radius of gyration with an i behind it has a negative square."""
-    names = [[f"r{min(a, b)}{max(a, b)}_pct" for b in "xyz"] for a in "xyz"]
-    radii = np.array([[float(row[name].rstrip("i")) / 100 for name in line] for line in names])
-    signs = np.array(
-        [[-1.0 if row[name].endswith("i") else 1.0 for name in line] for line in names]
-    )
-    com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
-    mass, length_m = float(row["mass_percent"]) / 100, float(row["mean_length_mm"]) / 1000
-    return TableRow(mass, com, np.array(signs) * radii**2, length_m)
 
 
 def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") -> Regression:
@@ -175,9 +175,7 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
             com[i, _ALONG.get(row, 1)] = _sd(spreads, row, "com")
     index, (low, high) = mass_kg / stature_m**2, figures["holds"]["body_mass_index"]
     is_small = stature_m < figures["holds"]["stature_m"][sex]
-    differs = partial(_build_differs, figures["share"], mass_kg)
-    differs = partial(_child_differs, figures["child"]) if is_small else differs
-    more = [differs(stature_m, row) for row in rows]
+    more = [_differs(figures, is_small, mass_kg, stature_m, row) for row in rows]
     outside = ""
     if is_small:
         outside = (
@@ -204,17 +202,17 @@ def _sd(spreads: Sequence[Mapping], row: str, name: str) -> float:
     return float(np.sqrt(np.mean([np.sum(np.square(one[row][name])) for one in spreads])))
 
 
-def _child_differs(child: Mapping, stature_m: float, row: str) -> float:
-    """By how much [%] a boy's share of the body's mass differs from a man's."""
-    boy, man = np.interp(stature_m, child["stature_m"], child[row]["boys"]), child[row]["men"]
-    return 100 * abs(float(boy) / man - 1)
-
-
-def _build_differs(share: Mapping, mass_kg: float, stature_m: float, row: str) -> float:
-    """By how much [%] a segment's share differs from that of people of the same stature and the
-    mean body-mass index."""
-
-    def of(kg: float) -> float:
-        return float(np.sum(np.array(share[row]) @ [1.0, kg, 100 * stature_m])) / kg
-
-    return 100 * abs(of(mass_kg) / of(share["body_mass_index"] * stature_m**2) - 1)
+def _differs(figures: Mapping, is_small: bool, mass_kg: float, stature_m: float, row: str) -> float:
+    """By how much [%] a segment's share of the body's mass differs: a boy's from a man's, else from
+    that of people of the same stature and the mean body-mass index."""
+    if is_small:
+        child = figures["child"]
+        own = float(np.interp(stature_m, child["stature_m"], child[row]["boys"]))
+        usual = child[row]["men"]
+    else:
+        share = figures["share"]
+        own, usual = (
+            float(np.sum(np.array(share[row]) @ [1.0, kg, 100 * stature_m])) / kg
+            for kg in (mass_kg, share["body_mass_index"] * stature_m**2)
+        )
+    return 100 * abs(own / usual - 1)

@@ -72,8 +72,7 @@ def from_readable(values: np.ndarray) -> Inertia:
 def readable_jacobian(phi: np.ndarray) -> np.ndarray:
     """(10, 10) derivative of the readable parameters with respect to ``phi``, same frame."""
     columns = []
-    for k, unit in enumerate(np.eye(10)):
-        h = 1e-6 * max(1.0, abs(phi[k]))
+    for h, unit in zip(1e-6 * np.maximum(1.0, np.abs(phi)), np.eye(10), strict=True):
         difference = from_phi(phi + h * unit).readable() - from_phi(phi - h * unit).readable()
         columns.append(difference / (2 * h))
     return np.stack(columns, axis=1)

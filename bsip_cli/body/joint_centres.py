@@ -40,16 +40,16 @@ _PELVIS = ("asis_l", "asis_r", "sacrum")
 
 def stood_in_for(known: Collection[str]) -> set[str]:
     """Names of the skin landmarks that the known centres can stand in for."""
+    if not set(_TRUNK) <= set(known):
+        return set()
     stand_ins = {
         f"{name}_{side}"
         for centre, names in _ACROSS.items()
         for side in "lr"
-        if f"{centre}_{side}" in known and set(_TRUNK) <= set(known)
+        if f"{centre}_{side}" in known
         for name in names
     }
-    if set(_TRUNK) <= set(known):
-        stand_ins |= {*_PELVIS, "acromion_l", "acromion_r"}
-    return stand_ins - set(known)
+    return {*stand_ins, *_PELVIS, "acromion_l", "acromion_r"} - set(known)
 
 
 def with_skin(
@@ -134,7 +134,16 @@ def _with_trunk(
         basis = "the pelvis, the trunk straight on it"
         if "suprasternale" not in landmarks and "c7" not in landmarks:
             missing.append("suprasternale")
-    placed = _placed(middle, waist, right)
+    # by the mean proportions about the acromia's middle
+    up = middle - waist
+    tall = float(np.linalg.norm(up))
+    y = up / tall
+    x = np.cross(y, right)
+    x /= np.linalg.norm(x)
+    half = 0.5 * _BREADTH * tall * np.cross(x, y)
+    placed = {"acromion_r": middle + half, "acromion_l": middle - half}
+    for name, (ahead, above) in (("c7", _C7), ("suprasternale", _SUPRASTERNALE)):
+        placed[name] = middle + tall * (ahead * x + above * y)
     names = ", ".join(in_words(name) for name in missing)
     note = f"no marker for {names}: placed by mean proportions from {basis}"
     return dict(landmarks) | {name: placed[name] for name in missing}, [note]
@@ -149,22 +158,6 @@ def _between(c7: np.ndarray, suprasternale: np.ndarray, waist: np.ndarray) -> np
     x, y = 0.5 * (_C7 + _SUPRASTERNALE)
     length = float(np.linalg.norm(up))
     return middle - length * x * ahead / np.linalg.norm(ahead) - y * up
-
-
-def _placed(middle: np.ndarray, waist: np.ndarray, right: np.ndarray) -> dict[str, np.ndarray]:
-    """C7, suprasternale and acromia by the mean proportions about the acromia's middle."""
-    up = middle - waist
-    length = float(np.linalg.norm(up))
-    y = up / length
-    x = np.cross(y, right)
-    x /= np.linalg.norm(x)
-    half = 0.5 * _BREADTH * length * np.cross(x, y)
-    return {
-        "c7": middle + length * (_C7[0] * x + _C7[1] * y),
-        "suprasternale": middle + length * (_SUPRASTERNALE[0] * x + _SUPRASTERNALE[1] * y),
-        "acromion_r": middle + half,
-        "acromion_l": middle - half,
-    }
 
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
@@ -237,7 +230,12 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
         raised = landmarks[f"acromion_{side}"] + down
         centres[f"shoulder_{side}"] = landmarks.get(f"shoulder_centre_{side}", raised)
         limbs.add_arm(side, sign * right, unit(waist - neck))
-        limbs.add_leg(side, sign * axes[:, 2])
+        for joint, name in (("knee", "knee"), ("ankle", "malleolus")):
+            lateral, half_m = landmarks[f"{name}_lateral_{side}"], _HALF_BREADTH[name] * stature_m
+            limbs.add_hinge(joint, name, side, lateral, sign * axes[:, 2], half_m)
+        toes = _mean(landmarks, _toes(side))
+        assert toes is not None
+        limbs.ends[f"foot_{side}"] = toes
     return JointCentres(centres, axes, limbs.hinges, limbs.ends, tuple(notes))
 
 
@@ -346,10 +344,16 @@ class _Limbs:
                 "the elbow, in its mean length"
             )
             wrist = lateral + fore * (lateral - shoulder) / np.linalg.norm(lateral - shoulder)
-        if half_m:
-            outward = _across_bent_elbow(unit(shoulder - lateral), lateral - wrist, outward)
+        if half_m:  # lateral is the normal of the arm's plane where it is bent, else the body's
+            upwards = unit(shoulder - lateral)
+            normal = np.cross(unit(lateral - wrist), upwards)
+            outward = outward - (outward @ upwards) * upwards
+            if np.linalg.norm(normal) < 0.35:  # less than about 20 degrees
+                outward = unit(outward)
+            else:
+                outward = unit(normal) * np.sign(normal @ outward)
         self.centres[f"wrist_{side}"] = wrist
-        self._add_hinge("elbow", "elbow", side, lateral, outward, half_m)
+        self.add_hinge("elbow", "elbow", side, lateral, outward, half_m)
         hand = _mean(self.landmarks, tuple(f"metacarpal_{k}_{side}" for k in (2, 3, 5)))
         if hand is not None:
             self.ends[f"hand_{side}"] = hand
@@ -366,15 +370,7 @@ class _Limbs:
             self.notes.append(f"the {words} has one marker only: taken as its centre")
         return single
 
-    def add_leg(self, side: str, outward: np.ndarray) -> None:
-        for joint, name in (("knee", "knee"), ("ankle", "malleolus")):
-            at = self.landmarks[f"{name}_lateral_{side}"], outward
-            self._add_hinge(joint, name, side, *at, _HALF_BREADTH[name] * self.stature_m)
-        toes = _mean(self.landmarks, _toes(side))
-        assert toes is not None
-        self.ends[f"foot_{side}"] = toes
-
-    def _add_hinge(
+    def add_hinge(
         self,
         joint: str,
         name: str,
@@ -395,17 +391,6 @@ class _Limbs:
             )
         self.centres[f"{joint}_{side}"] = centre
         self.hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
-
-
-def _across_bent_elbow(
-    long_axis: np.ndarray, forearm: np.ndarray, outward: np.ndarray
-) -> np.ndarray:
-    """Lateral direction: normal of the arm's plane where the elbow is bent, else the body's."""
-    normal = np.cross(unit(forearm), long_axis)
-    across = outward - (outward @ long_axis) * long_axis
-    if np.linalg.norm(normal) < 0.35:  # less than about 20 degrees
-        return unit(across)
-    return unit(normal) * np.sign(normal @ across)
 
 
 def _toes(side: str) -> tuple[str, ...]:

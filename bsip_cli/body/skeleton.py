@@ -91,10 +91,8 @@ class Skeleton:
 
     def informed(self, marked: Collection[str]) -> tuple[bool, ...]:
         """Whether each segment is a marked one or has one beyond it."""
-        known = [segment in marked for segment in self.segments]
-        for i in range(len(known) - 1, 0, -1):
-            known[self.parents[i]] |= known[i]
-        return tuple(known)
+        every = (self.beyond(i) for i in range(len(self.segments)))
+        return tuple(any(self.segments[k] in marked for k in beyond) for beyond in every)
 
     @cached_property
     def q_names(self) -> tuple[str, ...]:
@@ -170,11 +168,11 @@ def load_skeleton(name: str) -> Skeleton:
             expected="[[segments]] with name, parent, joint, type and table (empty without mass)",
         ) from None
     _check(skeleton, file)
-    _check_known(skeleton, file)
     return skeleton
 
 
 def _check(skeleton: Skeleton, file: Path) -> None:
+    """A tree of segments whose frames, inertias and tables exist, each on its joint."""
     base_first = skeleton.parents[:1] == (-1,) and skeleton.joint_types[0] == "free"
     ordered = all(0 <= parent < i for i, parent in enumerate(skeleton.parents) if i)
     known = set(skeleton.joint_types[1:]) <= {"spherical", "revolute"}
@@ -186,10 +184,6 @@ def _check(skeleton: Skeleton, file: Path) -> None:
             expected="the free base first, every parent before its children, joints of type "
             "spherical or revolute, and every name once",
         )
-
-
-def _check_known(skeleton: Skeleton, file: Path) -> None:
-    """The segments whose frames, inertias and tables exist, each on its joint."""
     faults = [f"no {name}" for name in SEGMENTS if name not in skeleton.segments]
     fields = ("segments", "joints", "joint_types", "table_rows", "landmarks")
     rows = zip(*(getattr(skeleton, field) for field in fields), strict=True)

@@ -45,7 +45,16 @@ def find_basis(model: pin.Model, known: np.ndarray | None = None) -> Basis:
     scale = np.linalg.norm(stacked, axis=0)
     scale[scale == 0] = 1.0
     triangle = np.asarray(np.linalg.qr(stacked / scale, mode="r"))
-    independent, dependent = _split(triangle)
+    directions = np.empty((len(triangle), 0))  # of the columns that stand on their own
+    alone = np.zeros(len(scale), dtype=bool)
+    for k, column in enumerate(triangle.T):
+        rest = column - directions @ (directions.T @ column)
+        rest -= directions @ (directions.T @ rest)
+        size = np.linalg.norm(rest)
+        alone[k] = size >= _TOLERANCE
+        if alone[k]:
+            directions = np.column_stack([directions, rest / size])
+    independent, dependent = np.flatnonzero(alone), np.flatnonzero(~alone)
     beta = np.linalg.lstsq(triangle[:, independent], triangle[:, dependent], rcond=None)[0]
     beta *= scale[dependent] / scale[independent][:, None]
     beta[np.abs(beta) < 1e-8] = 0.0
@@ -68,38 +77,15 @@ def random_regressor(model: pin.Model, states: int) -> np.ndarray:
     return wrench_regressor(model, model.createData(), q, v, a, np.zeros(3))
 
 
-def _split(triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns that stand on their own, and those that depend on earlier ones."""
-    columns = triangle.shape[1]
-    directions = np.empty((triangle.shape[0], 0))
-    independent, dependent = [], []
-    for k in range(columns):
-        rest = triangle[:, k] - directions @ (directions.T @ triangle[:, k])
-        rest -= directions @ (directions.T @ rest)
-        size = np.linalg.norm(rest)
-        if size < _TOLERANCE:
-            dependent.append(k)
-        else:
-            independent.append(k)
-            directions = np.column_stack([directions, rest / size])
-    return np.array(independent), np.array(dependent)
-
-
 def expressions(basis: Basis, segments: tuple[str, ...]) -> list[tuple[str, str, str]]:
     """(name, expression in words, unit) of every base parameter."""
+    names = [f"{parameter} {segment}" for segment in segments for parameter in PARAMETERS]
     named = []
     for row, leader in zip(basis.combine, basis.independent, strict=True):
-        terms = [
-            _term(row[k], f"{PARAMETERS[k % 10]} {segments[k // 10]}")
-            for k in np.flatnonzero(row)
-            if k != leader
-        ]
-        name = f"{PARAMETERS[leader % 10]} {segments[leader // 10]}"
-        named.append((name, " ".join([name, *terms]), UNITS[leader % 10]))
+        terms = [names[leader]]
+        for k in np.flatnonzero(row):
+            if k != leader:
+                size = "" if np.isclose(abs(row[k]), 1.0) else f"{abs(row[k]):.4g} "
+                terms.append(f"{'-' if row[k] < 0 else '+'} {size}{names[k]}")
+        named.append((names[leader], " ".join(terms), UNITS[leader % 10]))
     return named
-
-
-def _term(factor: float, name: str) -> str:
-    sign = "-" if factor < 0 else "+"
-    size = abs(factor)
-    return f"{sign} {name}" if np.isclose(size, 1.0) else f"{sign} {size:.4g} {name}"

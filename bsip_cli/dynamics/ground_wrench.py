@@ -170,16 +170,11 @@ class WrenchResponse:
         speed = np.gradient(errors, 1 / self.rate_hz, axis=0)
         for at in self.spherical:
             turning = slice(at, at + 3)
-            speed[:, turning] += _cross(self.v[:, turning], errors[:, turning])
+            speed[:, turning] += skew(self.v[:, turning]) @ errors[:, turning]
         linear, turning = slice(0, 3), slice(3, 6)
-        speed[:, linear] += _cross(self.v[:, turning], errors[:, linear])
-        speed[:, linear] += _cross(self.v[:, linear], errors[:, turning])
+        speed[:, linear] += skew(self.v[:, turning]) @ errors[:, linear]
+        speed[:, linear] += skew(self.v[:, linear]) @ errors[:, turning]
         return speed
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(N, 3) x (N, 3, k)."""
-    return skew(a) @ b
 
 
 def wrench_response(

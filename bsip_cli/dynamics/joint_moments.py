@@ -188,7 +188,11 @@ def _of_parameters(
             if covariance is not None:
                 part = covariance[np.ix_(columns, columns)]
                 of_each = np.einsum("nij,nij->ni", own @ part, own)
-                variance[:, j, :, m] = _between(some, of_each, len(rows))
+                if len(some) < len(rows):
+                    every_frame = np.arange(len(rows))
+                    lines = [np.interp(every_frame, some, x) for x in of_each.T]
+                    of_each = np.stack(lines, axis=1)
+                variance[:, j, :, m] = of_each
     return variance
 
 
@@ -218,13 +222,6 @@ def _of_turns(axes: np.ndarray, turned: Sequence[np.ndarray], vectors: np.ndarra
         changes.append((np.concatenate([turn, along[:, :, None]], axis=2) @ vectors) ** 2)
     (one, two, of_first), (three, four, of_third) = (np.moveaxis(x, 2, 0) for x in changes)
     return np.stack([one + two, of_first + of_third, three + four], axis=2)
-
-
-def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count, c) on lines between the values (s, c) at indices (s,)."""
-    if len(some) == count:
-        return values
-    return np.stack([np.interp(np.arange(count), some, x) for x in values.T], axis=1)
 
 
 def _axes(skeleton: Skeleton, motion: SegmentMotion) -> tuple[np.ndarray, np.ndarray]:

@@ -39,7 +39,11 @@ def lowpass_operator(
     """
     sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz) * rate_hz
     reach = int(np.ceil(_REACH * sigma))
-    starts, stops, frames = _outputs(valid, stride)
+    parts = [np.empty((0, 3), dtype=int)]
+    for start, stop in valid_intervals(valid):
+        own = np.arange(start + min(stride, stop - start) // 2, stop, stride)
+        parts.append(np.stack([np.full_like(own, start), np.full_like(own, stop), own], axis=1))
+    starts, stops, frames = np.concatenate(parts).T
     columns = frames[:, None] + np.arange(-reach, reach + 1)
     inside = (columns >= starts[:, None]) & (columns < stops[:, None])
     kernel = inside * np.exp(-0.5 * ((columns - frames[:, None]) / sigma) ** 2)
@@ -47,16 +51,6 @@ def lowpass_operator(
     ends = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
     shape = (len(frames), len(valid))
     return sparse.csr_array((weights, columns[inside], ends), shape=shape), frames
-
-
-def _outputs(valid: np.ndarray, stride: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n_out,) start and stop of each output's interval, and its frame."""
-    parts = [np.empty((0, 3), dtype=int)]
-    for start, stop in valid_intervals(valid):
-        frames = np.arange(start + min(stride, stop - start) // 2, stop, stride)
-        parts.append(np.stack([np.full_like(frames, start), np.full_like(frames, stop), frames], 1))
-    starts, stops, frames = np.concatenate(parts).T
-    return starts, stops, frames
 
 
 def noise_left(rate_hz: float, cutoff_hz: float) -> float:

@@ -101,7 +101,11 @@ def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray
         free = np.asarray(data.joints[j].S).reshape(6, joint.nv)
         lever = rotation[parent] @ place.translation
         hinge = rotation[parent] @ place.rotation
-        rotation[j] = hinge @ _rotations(q[:, joint.idx_q : joint.idx_q + joint.nq], free[3:])
+        entries = q[:, joint.idx_q : joint.idx_q + joint.nq]
+        half, turns = 0.5 * entries, entries[:, -4:]  # which end in a quaternion, or are an angle
+        if joint.nq == 1:
+            turns = np.hstack([np.sin(half) * free[3:].T, np.cos(half)])
+        rotation[j] = hinge @ rotations_of(turns)
         speed, rate = (np.split(x[:, own] @ free.T, 2, axis=1) for x in (v, a))
         (linear, spin), (linear_rate, spin_rate) = (
             [(rotation[j] @ part[..., None])[..., 0] for part in parts] for parts in (speed, rate)
@@ -114,19 +118,10 @@ def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray
         )
         position[j] = position[parent] + lever
         if joint.nq == _FREE:
-            position[j] += (hinge @ q[:, joint.idx_q : joint.idx_q + 3, None])[..., 0]
+            position[j] += (hinge @ entries[:, :3, None])[..., 0]
             acceleration[j] += linear_rate + _cross(spin, linear)
     parts = (rotation, position, acceleration, turning, turning_rate)
     return SegmentMotion(*(np.ascontiguousarray(x[1:].swapaxes(0, 1)) for x in parts))
-
-
-def _rotations(q: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) of a joint's entries in q: a place and a quaternion, a quaternion, or the angle
-    about ``axis`` (3, 1)."""
-    if q.shape[1] > 1:
-        return rotations_of(q[:, -4:])
-    half = 0.5 * q
-    return rotations_of(np.hstack([np.sin(half) * axis.T, np.cos(half)]))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

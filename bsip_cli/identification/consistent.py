@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from bsip_cli.body.inertia import second_moments
 from bsip_cli.errors import NumericalError
@@ -75,10 +75,7 @@ def hessian(phi: np.ndarray) -> np.ndarray:
     """(10 n, 10 n) of the sum of the divergences, one block per segment, whatever the table."""
     turned = np.einsum("nij,kjl->nkil", np.linalg.inv(pseudo_inertias(phi)), BASIS)
     blocks = np.einsum("nkil,nmli->nkm", turned, turned)
-    out = np.zeros((phi.size, phi.size))
-    for i, block in enumerate(blocks):
-        out[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = block
-    return out
+    return block_diag(*blocks)
 
 
 # --- the convex problem behind ``consistent``, and a damped Newton method for it ------------------
@@ -250,7 +247,8 @@ class Fit:
 def terms_of(problem: Problem) -> Terms:
     """Normal equations and priors of a problem, about the table's values."""
     prior = problem.prior
-    information, right = problem.trusted_with_instruments()
+    equations = problem.jointly or problem.equations
+    information, right = equations.weighted(problem.noise.weights() / problem.trust_ratio**2)
     size, beyond = len(prior.phi), len(right) - len(prior.phi)
     every = tuple(range(len(prior.inertias)))
     groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]
@@ -306,7 +304,17 @@ def fit_with_weights(terms: Terms) -> Fit:
     for gamma in _GAMMAS:
         fit = fit_at(terms, Weights(spread, gamma), best)
         for _ in range(_ROUNDS):
-            old, new = fit.weights.spread, _updated(terms, fit)
+            x, old = fit.optimum.x, fit.weights.spread
+            removed, count = fit.prior_covariance - fit.optimum.covariance, terms.spread_weight
+            new = np.array(  # MacKay's rule
+                [
+                    (count + max(weight * np.sum(removed * precision), 0.0))
+                    / (count + x @ precision @ x)
+                    for weight, precision in zip(old, terms.spreads, strict=True)
+                ]
+            )
+            new = np.clip(new, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
+            new[_NEVER_WIDER] = np.maximum(new[_NEVER_WIDER], 1.0)
             fit = fit_at(terms, Weights(new, gamma), fit)
             if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
@@ -332,21 +340,6 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     )
     decided = max(float(decided - (1 - kept / known).sum()), 0.0)
     return Fit(weights, optimum, float(0.5 * logs - optimum.value), covariance, decided)
-
-
-def _updated(terms: Terms, fit: Fit) -> np.ndarray:
-    """MacKay's rule for the spreads."""
-    x, old, count = fit.optimum.x, fit.weights.spread, terms.spread_weight
-    removed = fit.prior_covariance - fit.optimum.covariance
-    spread = np.array(
-        [
-            (count + max(weight * np.sum(removed * precision), 0.0)) / (count + x @ precision @ x)
-            for weight, precision in zip(old, terms.spreads, strict=True)
-        ]
-    )
-    spread = np.clip(spread, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
-    spread[_NEVER_WIDER] = np.maximum(spread[_NEVER_WIDER], 1.0)
-    return spread
 
 
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.

@@ -67,7 +67,9 @@ def change_of_segments(a: Problem, b: Problem, segments: Sequence[int]) -> Segme
     marginalised. ``segments`` are indices, none the parent of another: what a joint connects
     shares its mass. Both problems need the same prior.
     """
-    (information_a, right_a), (information_b, right_b) = (_about_table(p) for p in (a, b))
+    (information_a, right_a), (information_b, right_b) = (p.trusted_equations() for p in (a, b))
+    right_a = right_a - information_a @ a.prior.phi  # of deviations from the table
+    right_b = right_b - information_b @ b.prior.phi
     part = (10 * np.asarray(segments)[:, None] + np.arange(10)).ravel()
     root = a.prior.root
     inner = np.eye(root.shape[1]) + root.T @ (information_a + information_b) @ root
@@ -78,12 +80,6 @@ def change_of_segments(a: Problem, b: Problem, segments: Sequence[int]) -> Segme
     scale = 1 / np.sqrt(np.diag(precision))  # kg and kg m2
     covariance = np.outer(scale, scale) * np.linalg.inv(np.outer(scale, scale) * precision)
     return SegmentChange(covariance @ right, covariance)
-
-
-def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Information (P, P) of the data, and its right side (P,) for deviations from the table."""
-    information, right = problem.trusted_equations()
-    return information, right - information @ problem.prior.phi
 
 
 def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -54,10 +54,7 @@ _SOLVED = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
 
 
 def smallest(
-    equal: sparse.sparray | np.ndarray,
-    targets: np.ndarray,
-    below: sparse.sparray | np.ndarray,
-    limits: np.ndarray,
+    equal: np.ndarray, targets: np.ndarray, below: np.ndarray, limits: np.ndarray
 ) -> np.ndarray:
     """(k,) vector x of the smallest square with ``equal x = targets`` and ``below x <= limits``.
 
@@ -69,7 +66,7 @@ def smallest(
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(sparse.eye_array(size)),
         np.zeros(size),
-        sparse.csc_matrix(sparse.vstack([sparse.csc_array(equal), sparse.csc_array(below)])),
+        sparse.csc_matrix(np.vstack([equal, below])),
         np.concatenate([targets, limits]),
         [clarabel.ZeroConeT(len(targets)), clarabel.NonnegativeConeT(len(limits))],
         settings,

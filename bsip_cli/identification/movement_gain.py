@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -45,7 +44,9 @@ class Swing:
         slow, fast = self.hz
         cycles = slow * times_s + 0.5 * (fast - slow) * times_s**2 / DURATION_S
         wave = np.sin(2 * np.pi * cycles + self.phase_rad)
-        return _eased(times_s) * (self.middle_rad + self.swing_rad * wave)
+        part = np.clip(np.minimum(times_s, DURATION_S - times_s) / _EASE_S, 0.0, 1.0)
+        eased = part**3 * (10 - 15 * part + 6 * part**2)  # two continuous derivatives
+        return eased * (self.middle_rad + self.swing_rad * wave)
 
 
 @dataclass(frozen=True)
@@ -58,35 +59,26 @@ class Movement:
     swings: tuple[Swing, ...]
 
 
-def _eased(times_s: np.ndarray) -> np.ndarray:
-    """(N,) from 0 to 1 and back, with two continuous derivatives."""
-    part = np.clip(np.minimum(times_s, DURATION_S - times_s) / _EASE_S, 0.0, 1.0)
-    return part**3 * (10 - 15 * part + 6 * part**2)
-
-
 # --- which movements there are ----------------------------------------------------------------
 
 
 def load_movements() -> tuple[Movement, ...]:
     """The movements of ``configs/movements.toml``, those of one side once for each side."""
-    rows = tomllib.loads(shipped("movements.toml").read_text(encoding="utf-8"))["movements"]
-    return tuple(
-        _movement(row, side) for row in rows for side in (_SIDES if "side" in row else ("",))
-    )
-
-
-def _movement(row: dict, side: str) -> Movement:
-    other = {"l": "r", "r": "l"}.get(side, "")
-    words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
-    letters, swings = {"side": side, "other": other}, []
-    for part in row["joints"]:
-        joint, axis = part["joint"].format(**letters), _AXES.index(part["axis"])
-        mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
-        middle, swing = (mirror * np.deg2rad(part[n]) for n in ("middle_deg", "swing_deg"))
-        phase = np.deg2rad(part.get("phase_deg", 0.0))
-        swings.append(Swing(joint, axis, middle, swing, tuple(part["hz"]), phase))
-    names = (row["name"].format(**letters), row["text"].format(**words))
-    return Movement(*names, row["stance"].format(**letters), tuple(swings))
+    text, movements = shipped("movements.toml").read_text(encoding="utf-8"), []
+    for row in tomllib.loads(text)["movements"]:
+        for side in _SIDES if "side" in row else ("",):
+            other = {"l": "r", "r": "l"}.get(side, "")
+            words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
+            letters, swings = {"side": side, "other": other}, []
+            for part in row["joints"]:
+                joint, axis = part["joint"].format(**letters), _AXES.index(part["axis"])
+                mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
+                middle, swing = (mirror * np.deg2rad(part[n]) for n in ("middle_deg", "swing_deg"))
+                phase = np.deg2rad(part.get("phase_deg", 0.0))
+                swings.append(Swing(joint, axis, middle, swing, tuple(part["hz"]), phase))
+            name, stance = (row[key].format(**letters) for key in ("name", "stance"))
+            movements.append(Movement(name, row["text"].format(**words), stance, tuple(swings)))
+    return tuple(movements)
 
 
 def possible(movement: Movement, person: Person) -> bool:
@@ -113,43 +105,28 @@ def motion_of(
     times = np.arange(-step, DURATION_S + 1.5 * step, step)
     upright = pin.neutral(model)  # segments' Y up and X along the world's X
     upright[3:7] = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
-    turns = _turns(movement, person, times)
-    q = _standing_on(movement, person, model, [pin.integrate(model, upright, x) for x in turns])
-    steps = np.stack([pin.difference(model, a, b) for a, b in pairwise(q)])
-    v = (steps[1:] + steps[:-1]) / (2 * step)
-    a = (steps[1:] - steps[:-1]) / step**2
-    return q[1:-1], v, a
-
-
-def _turns(movement: Movement, person: Person, times: np.ndarray) -> np.ndarray:
-    """(N, nv) of the joints, from standing upright."""
     skeleton = person.skeleton
-    turns = np.zeros((len(times), len(skeleton.v_names)))
+    turns = np.zeros((len(times), model.nv))  # of the joints, from standing upright
     for swing in movement.swings:
         joint = skeleton.joints.index(swing.joint)
         # A hinge has one coordinate, whatever axis it turns about.
         axis = swing.axis if skeleton.joint_types[joint] == "spherical" else 0
         turns[:, skeleton.v_starts[joint] + axis] += swing.angle_rad(times)
-    return turns
-
-
-def _standing_on(
-    movement: Movement, person: Person, model: pin.Model, poses: Sequence[np.ndarray]
-) -> np.ndarray:
-    """(N, nq) with the stance foot where the first pose, upright, has it, its lowest marker on the
-    ground."""
-    data = model.createData()
-    foot = person.skeleton.index(f"foot_{movement.stance}")
-    pin.forwardKinematics(model, data, poses[0])
+    q = np.stack([pin.integrate(model, upright, x) for x in turns])
+    # the stance foot where the first pose, upright, has it, its lowest marker on the ground
+    data, foot = model.createData(), skeleton.index(f"foot_{movement.stance}")
+    pin.forwardKinematics(model, data, q[0])
     home = data.oMi[foot + 1].copy()
     markers = person.markers_in_joint_m()[person.marker_segments == foot]
     home.translation[2] = -min((home.rotation @ markers.T)[2], default=0.0)
-    placed = np.stack(poses)
-    for row in placed:
+    for row in q:
         pin.forwardKinematics(model, data, row)
         base = home * data.oMi[foot + 1].inverse() * data.oMi[1]
         row[:7] = pin.SE3ToXYZQUAT(base)
-    return placed
+    steps = np.stack([pin.difference(model, a, b) for a, b in pairwise(q)])
+    v = (steps[1:] + steps[:-1]) / (2 * step)
+    a = (steps[1:] - steps[:-1]) / step**2
+    return q[1:-1], v, a
 
 
 _ADVISED = 3

@@ -9,6 +9,7 @@ from scipy.linalg import block_diag
 
 from bsip_cli.body.inertia import Inertia, readable_jacobian, rod_length_m
 from bsip_cli.body.person import Person
+from bsip_cli.segments import mirrored
 
 # How the readable parameters of a left segment go with the right one's: Z points to the right on
 # both sides of the body.
@@ -94,10 +95,19 @@ def prior_of(
     pairs = _pairs(names, fixed)
     own, alike = _own_spread(inertias, spread, names)
     readable = block_diag(*(readable_jacobian(part) for part in phi.reshape(-1, 10)))
-    together = _together(pairs, spread.left_right_correlation, alike)
+    # root of the correlation of all: a twin's is the mirrored one's, in what both sides share
+    together, rows = np.eye(len(phi)), np.arange(10)
+    for first, second in (10 * np.array(pair)[:, None] + rows for pair in pairs if len(pair) == 2):
+        shared = spread.left_right_correlation * alike[first] * alike[second]
+        together[second, first] = shared * _MIRROR
+        together[second, second] = np.sqrt(1 - shared**2)
     spread_root = np.linalg.solve(readable, own @ together)
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
-    root = _with_total_mass(spread_root, total_mass_sd_kg, ~fixed)
+    # once the sum of the free masses is known to that
+    total = spread_root[::10][~fixed].sum(axis=0)
+    variance = total @ total
+    shrink = 1.0 - total_mass_sd_kg / np.sqrt(variance + total_mass_sd_kg**2)
+    root = spread_root - shrink * np.outer(spread_root @ total, total) / variance
     readable_sd = np.linalg.norm(readable @ root, axis=1).reshape(-1, 10)
     white = np.linalg.inv(spread_root)
     known = (total_mass_sd_kg, fixed, spread.origin_sd_m)
@@ -114,43 +124,16 @@ def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.nd
     return prior.phi + prior.root @ np.linalg.solve(scaled, slope)
 
 
-def _with_total_mass(root: np.ndarray, sd_kg: float, free: np.ndarray) -> np.ndarray:
-    """The root of the covariance once the sum of the free (n,) masses is known to ``sd_kg``."""
-    total = root[::10][free].sum(axis=0)
-    variance = total @ total
-    shrink = 1.0 - sd_kg / np.sqrt(variance + sd_kg**2)
-    return root - shrink * np.outer(root @ total, total) / variance
-
-
 def _pairs(names: tuple[str, ...], fixed: np.ndarray) -> tuple[tuple[int, ...], ...]:
     """Both sides of a limb where both are free; every other segment alone."""
     pairs: list[tuple[int, ...]] = []
     for i, name in enumerate(names):
-        other = name.removesuffix("_l") + "_r" if name.endswith("_l") else name[:-2] + "_l"
-        twin = names.index(other) if _has_side(name) and other in names else i
+        twin = names.index(mirrored(name)) if mirrored(name) in names else i
         if twin == i or fixed[i] or fixed[twin]:
             pairs.append((i,))
         elif i < twin:
             pairs.append((i, twin))
     return tuple(pairs)
-
-
-def _has_side(name: str) -> bool:
-    return name.endswith(("_l", "_r"))
-
-
-def _together(
-    pairs: tuple[tuple[int, ...], ...], correlation: float, alike: np.ndarray
-) -> np.ndarray:
-    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's,
-    in the parts ``alike`` (10 n,) of their standard deviations that both sides share."""
-    root = np.eye(len(alike))
-    for first, second in (pair for pair in pairs if len(pair) == 2):
-        rows = np.arange(10)
-        own = correlation * alike[10 * first + rows] * alike[10 * second + rows]
-        root[10 * second + rows, 10 * first + rows] = own * _MIRROR
-        root[10 * second + rows, 10 * second + rows] = np.sqrt(1 - own**2)
-    return root
 
 
 def _own_spread(
@@ -164,8 +147,11 @@ def _own_spread(
     com = np.broadcast_to(spread.com_sd_percent, (len(names), 3)) / 100
     moments = np.broadcast_to(spread.inertia_sd_percent, len(names)) / 100
     for i, (inertia, name) in enumerate(zip(inertias, names, strict=True)):
-        sd = _readable_sd(inertia, mass[i], com[i], moments[i])
-        if not _has_side(name):
+        own = np.diag(inertia.tensor_kgm2)
+        products = np.sqrt([own[0] * own[1], own[0] * own[2], own[1] * own[2]])
+        centre, part = com[i] * rod_length_m(inertia), moments[i]
+        sd = np.r_[mass[i] * inertia.mass_kg, centre, part * own, 0.5 * part * products]
+        if mirrored(name) == name:
             sd[_SIDEWAYS] = min(sd[_SIDEWAYS], spread.midline_sd_m)
         if name in _EDITIONS_APART_M:
             sd[_FORWARDS] = np.hypot(sd[_FORWARDS], _EDITIONS_APART_M[name])
@@ -177,12 +163,3 @@ def _own_spread(
         block[4:, 0] = mass[i] * inertia.readable()[4:]
         blocks.append(block)
     return block_diag(*blocks), np.concatenate(alike)
-
-
-def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) -> np.ndarray:
-    """(10,) in the order of :meth:`Inertia.readable`, from parts of the mass, of the rod's length
-    (3,) and of the moments."""
-    moments = np.diag(inertia.tensor_kgm2)
-    products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
-    centre = com * rod_length_m(inertia)
-    return np.r_[mass * inertia.mass_kg, centre, part * moments, 0.5 * part * products]

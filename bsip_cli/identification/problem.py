@@ -51,10 +51,6 @@ _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
 
 
-def _alike(noise_level: np.ndarray) -> np.ndarray:
-    return np.ones((len(noise_level), 6))
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Motion and measured wrench of one trial.
@@ -140,7 +136,7 @@ def accumulate(
     recordings: list[Recording],
     cutoff_hz: float,
     reference_m: np.ndarray,
-    weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
+    weights_at: Callable[[np.ndarray], np.ndarray] | None = None,
     instruments: Instruments | None = None,
 ) -> NormalEquations:
     """Both sides of the equations through the same low-pass, decimated, weighted and summed.
@@ -154,7 +150,9 @@ def accumulate(
     for recording in recordings:
         blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, instruments)
         for regressor, wrench, noise_level in blocks:
-            root = np.sqrt(weights_at(noise_level))
+            root = np.ones((len(wrench), 6))
+            if weights_at is not None:
+                root = np.sqrt(weights_at(noise_level))
             measured = root * wrench
             for c in range(6):
                 rows = root[:, c, None] * regressor[:, c]
@@ -258,8 +256,19 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     """Noise from what a fit leaves, one series per recording."""
     residual = np.concatenate([one.residual for one in series])
     level = np.concatenate([one.noise_level for one in series])
-    fits = [_size_over_time(residual[:, c], level) for c in range(6)]
-    steady, with_level = np.array(fits).T
+    # standard deviations, steady and per level, of likely Gaussian residuals
+    terms = np.stack([np.ones_like(level), level**2], axis=1)
+    scale = np.maximum(terms.mean(axis=0), 1e-300)
+    terms, parts = terms / scale, np.empty((6, 2))
+    for c in range(6):
+        square = residual[:, c] ** 2
+        mean = max(float(square.mean()), 1e-18)
+        variance = np.full_like(square, mean)
+        for _ in range(_NOISE_ROUNDS):
+            parts[c], _ = nnls(terms / variance[:, None], square / variance)
+            parts[c, 0] = max(parts[c, 0], _QUIETEST**2 * mean)
+            variance = terms @ parts[c]
+    steady, with_level = np.sqrt(parts / [1.0, scale[1]]).T
     spread = np.sqrt(_variances(steady, with_level, level))
     ends = np.cumsum([len(one.residual) for one in series])
     spans = [(int(e - len(s.residual)), int(e)) for e, s in zip(ends, series, strict=True)]
@@ -267,21 +276,6 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
     effective = np.clip(np.nan_to_num(counts, nan=1.0), 1.0, len(residual))
     rms = 1 / np.sqrt((1 / spread**2).mean(axis=0))
     return Noise(rms, effective, len(residual), steady, with_level)
-
-
-def _size_over_time(residual: np.ndarray, level: np.ndarray) -> tuple[float, float]:
-    """Standard deviations (steady, per level) of likely Gaussian residuals (n,)."""
-    square = residual**2
-    mean = max(float(square.mean()), 1e-18)
-    terms = np.stack([np.ones_like(level), level**2], axis=1)
-    scale = np.maximum(terms.mean(axis=0), 1e-300)
-    variance = np.full_like(square, mean)
-    parts = np.array([mean, 0.0])
-    for _ in range(_NOISE_ROUNDS):
-        parts, _ = nnls(terms / scale / variance[:, None], square / variance)
-        parts[0] = max(parts[0], _QUIETEST**2 * mean)
-        variance = terms / scale @ parts
-    return float(np.sqrt(parts[0])), float(np.sqrt(parts[1] / scale[1]))
 
 
 def _variances(steady: np.ndarray, with_level: np.ndarray, level: np.ndarray) -> np.ndarray:
@@ -319,11 +313,6 @@ class Problem:
     def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
         return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
-
-    def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
-        equations = self.jointly or self.equations
-        return equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
 
 @dataclass(frozen=True, eq=False)

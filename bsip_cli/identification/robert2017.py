@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.hansen2017 import smallest
@@ -80,14 +79,9 @@ def programme_of(problem: Problem) -> Programme:
 
 def solve(programme: Programme) -> np.ndarray:
     """(P,) steps z from the table, in spreads."""
-    size = programme.table.size
-    masses = np.arange(0, size, 10)
-    bounds = sparse.csc_matrix(
-        (-programme.spread[masses], (np.arange(len(masses)), masses)), shape=(len(masses), size)
-    )
     # The relations are variables of their own: squared, their weights would cost half the digits.
-    count = len(programme.targets)
-    relations = sparse.hstack([sparse.csc_matrix(programme.relations), -sparse.eye_array(count)])
-    limits = programme.table[masses] - programme.floor
-    bounds = sparse.hstack([bounds, sparse.csc_matrix((len(masses), count))])
+    size, count = programme.table.size, len(programme.targets)
+    relations = np.hstack([programme.relations, -np.eye(count)])
+    bounds = np.hstack([-np.diag(programme.spread)[::10], np.zeros((size // 10, count))])
+    limits = programme.table[::10] - programme.floor
     return smallest(relations, programme.targets, bounds, limits)[:size]

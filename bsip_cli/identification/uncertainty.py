@@ -44,17 +44,16 @@ def excitation(problem: Problem) -> Excitation:
     smallest = singular[-1]
     condition = float(singular[0] / smallest) if smallest > 0 else float("inf")
     known = beforehand(problem)
-    table, left = (_segments(known.covariance(x)) for x in (0 * information, information))
+    n = len(information) // 10
+    own = np.arange(n)  # (n, 10, 10) of each segment's own parameters
+    table, left = (
+        known.covariance(x).reshape(n, 10, n, 10)[own, :, own]
+        for x in (0 * information, information)
+    )
     share = 1.0 - np.einsum("nii->n", left) / 10
     parts = [eigh(*pair, eigvals_only=True) for pair in zip(left, table, strict=True)]
     combinations = (np.array(parts) < _BETTER_THAN_TABLE).sum(axis=1)
     return Excitation(singular, condition, share, combinations)
-
-
-def _segments(covariance: np.ndarray) -> np.ndarray:
-    """(n, 10, 10) of each segment's own parameters."""
-    n = len(covariance) // 10
-    return covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]
 
 
 # --- what a motion can add to the table on each segment: how much the data decide -----------------

@@ -98,10 +98,19 @@ def _frames(
     if "suprasternale" in landmarks and "c7" in landmarks:
         right = np.cross(landmarks["suprasternale"] - landmarks["c7"], up)
     torso = _y_first(up, right)
+    # the head: to the right between paired markers, up to the vertex or vertically
+    pairs = [
+        landmarks[f"{name}_r"] - landmarks[f"{name}_l"]
+        for name in ("temple", "forehead", "occiput")
+        if f"{name}_r" in landmarks
+    ]
+    vertical = np.array([0.0, 0.0, 1.0])
+    up = landmarks["vertex"] - p["neck"] if "vertex" in landmarks else vertical
+    head = _y_first(up, np.mean(pairs, axis=0) if pairs else torso[:, 2])
     frames = {
         "lower_torso": (p["waist"], centres.pelvis_axes),
         "upper_torso": (p["neck"], torso),
-        "head": (p["neck"], _head(landmarks, p["neck"], torso)),
+        "head": (p["neck"], head),
     }
     for s in "lr":
         # Rods without mass need no axes of their own: their angles count from this pose.
@@ -125,18 +134,6 @@ def _frames(
         y = unit(np.cross(centres.hinges[f"ankle_{s}"], x))
         frames[f"foot_{s}"] = (p[f"ankle_{s}"], np.stack([x, y, np.cross(x, y)], axis=1))
     return {name: frames[name] for name in skeleton.segments}
-
-
-def _head(landmarks: Mapping[str, np.ndarray], neck: np.ndarray, torso: np.ndarray) -> np.ndarray:
-    """Axes of the head: to the right between paired markers, up to the vertex or vertically."""
-    pairs = [
-        landmarks[f"{name}_r"] - landmarks[f"{name}_l"]
-        for name in ("temple", "forehead", "occiput")
-        if f"{name}_r" in landmarks
-    ]
-    right = np.mean(pairs, axis=0) if pairs else torso[:, 2]
-    up = landmarks["vertex"] - neck if "vertex" in landmarks else np.array([0.0, 0.0, 1.0])
-    return _y_first(up, right)
 
 
 def _y_first(y: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -217,12 +217,8 @@ def marker_residuals(person: Person, q: np.ndarray, markers: np.ndarray) -> np.n
 
 def subtrees(person: Person) -> np.ndarray:
     """(n, m) True where marker m hangs on segment n or beyond it."""
-    parents = person.skeleton.parents
-    on = np.zeros((len(parents), len(person.markers)), dtype=bool)
-    on[person.marker_segments, np.arange(len(person.markers))] = True
-    for i in range(len(parents) - 1, 0, -1):
-        on[parents[i]] |= on[i]
-    return on
+    segments, skeleton = person.marker_segments, person.skeleton
+    return np.array([np.isin(segments, skeleton.beyond(i)) for i in range(len(skeleton.segments))])
 
 
 def pose_columns(
@@ -283,7 +279,7 @@ class PoseResponse:
         """
         chosen = range(len(self.person.markers)) if markers is None else markers
         moved = np.empty((len(self.q), self.inverse.shape[1], errors_m.shape[-1]))
-        for part, columns, _ in _columns(_with_only(self.person, chosen), self.q):
+        for part, columns, _ in _columns(self.person, self.q, chosen):
             weighted = self.weights[part][:, chosen, None, None] * errors_m[part]
             moved[part] = _flat(columns).swapaxes(1, 2) @ _flat(weighted)
         return self.inverse @ moved
@@ -333,28 +329,20 @@ def marker_trust(residual_m: np.ndarray, limit_m: float) -> np.ndarray:
     return np.where(np.isfinite(distance), share, 0.0)
 
 
-def _columns(person: Person, q: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Frames, velocity (n, m, 3, nv) of the markers for unit velocities, axes (n, m, 3, 3)."""
-    tree, below = tree_of(person), subtrees(person)
+def _columns(
+    person: Person, q: np.ndarray, markers: Sequence[int] | None = None
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Frames, velocity (n, m, 3, nv) of all or some markers for unit velocities, and the axes
+    (n, m, 3, 3) of their segments."""
+    chosen = range(len(person.markers)) if markers is None else markers
+    tree, below = tree_of(person), subtrees(person).take(chosen, axis=1)
     for start in range(0, len(q), _BLOCK):
         part = slice(start, start + _BLOCK)
         R, p = tree.forward(q[part])
-        columns = pose_columns(tree, R, p, model_markers(person, R, p), below)
-        yield part, columns, R[:, person.marker_segments]
+        model = model_markers(person, R, p).take(chosen, axis=1)
+        yield part, pose_columns(tree, R, p, model, below), R[:, person.marker_segments[chosen]]
 
 
 def _flat(x: np.ndarray) -> np.ndarray:
     """(N, m, 3, k) as (N, 3 m, k)."""
     return x.reshape(len(x), -1, x.shape[-1])
-
-
-def _with_only(person: Person, markers: Sequence[int]) -> Person:
-    """The person with some of the markers."""
-    chosen = list(markers)
-    return replace(
-        person,
-        markers=tuple(person.markers[m] for m in chosen),
-        marker_segments=person.marker_segments[chosen],
-        marker_positions_m=person.marker_positions_m[chosen],
-        marker_weights=person.marker_weights[chosen],
-    )

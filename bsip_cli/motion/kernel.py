@@ -23,10 +23,6 @@ Tree = namedtuple(
 # What is fitted: segment, place on it [m] and weight [1/m2] of each marker; the residual [m] beyond
 # which a marker's pull fades; and the precision (nv,) [1/rad2] that pulls angles to zero.
 Task = namedtuple("Task", "segments positions weights limit prior")
-# Sums over the markers on each segment and beyond: weight, weighted place, its second moments,
-# weighted residual and its moment, and products of place and residual; places count from the base's
-# origin.
-Sums = namedtuple("Sums", "weight first second force moment product")
 
 
 @compiled
@@ -65,16 +61,6 @@ def _turn_quaternion(q, omega):
     norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     for k2 in range(4):
         q[k2] /= norm
-
-
-@compiled
-def _rotation_vector(q, out):
-    """Rotation vector of a unit quaternion, by the shorter way."""
-    sign = 1.0 if q[3] >= 0 else -1.0
-    s = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
-    k = 2.0 if s < 1e-12 else 2.0 * np.arctan2(s, sign * q[3]) / s
-    for i in range(3):
-        out[i] = sign * k * q[i]
 
 
 @compiled
@@ -121,6 +107,24 @@ def forward(q, tree, R, p):
 
 
 @compiled
+def _angles(q, tree):
+    """(nv,) joint angles, which the prior pulls to zero; of the base, zeros. Of a unit quaternion
+    the rotation vector, by the shorter way."""
+    angles = np.zeros(tree.v_segments.size)
+    for i in range(1, tree.kinds.size):
+        at, av = tree.q_starts[i], tree.v_starts[i]
+        if tree.kinds[i] == SPHERICAL:
+            sign = 1.0 if q[at + 3] >= 0 else -1.0
+            s = np.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2)
+            k = 2.0 if s < 1e-12 else 2.0 * np.arctan2(s, sign * q[at + 3]) / s
+            for j in range(3):
+                angles[av + j] = sign * k * q[at + j]
+        else:
+            angles[av] = q[at]
+    return angles
+
+
+@compiled
 def _evaluate(q, tree, task, measured, R, p, residuals):
     """Pose the model; fill R, p and the residuals (m, 3): measured less model, NaN where missing.
 
@@ -141,15 +145,9 @@ def _evaluate(q, tree, task, measured, R, p, residuals):
         d = np.sqrt(d2)
         loss = 0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit))
         total += task.weights[m] * loss
-    turn = np.empty(3)
-    for i in range(1, tree.kinds.size):
-        at, av = tree.q_starts[i], tree.v_starts[i]
-        if tree.kinds[i] == SPHERICAL:
-            _rotation_vector(q[at : at + 4], turn)
-            for j in range(3):
-                total += 0.5 * task.prior[av + j] * turn[j] ** 2
-        else:
-            total += 0.5 * task.prior[av] * q[at] ** 2
+    angles = _angles(q, tree)
+    for k in range(6, angles.size):
+        total += 0.5 * task.prior[k] * angles[k] ** 2
     return total
 
 
@@ -160,19 +158,14 @@ def _columns(R, p, tree, d, w):
     for i in range(tree.kinds.size):
         at = tree.v_starts[i]
         if tree.kinds[i] == FREE:
-            for k in range(3):
-                for j in range(3):
-                    d[at + k, j] = R[i, j, k]
-                    w[at + k, j] = 0.0
-                    d[at + 3 + k, j] = 0.0
-                    w[at + 3 + k, j] = R[i, j, k]
+            d[at : at + 3], w[at : at + 3] = R[i].T, 0.0
+            d[at + 3 : at + 6], w[at + 3 : at + 6] = 0.0, R[i].T
             continue
         for j in range(3):
             r[j] = p[i, j] - p[0, j]
         if tree.kinds[i] == SPHERICAL:
+            w[at : at + 3] = R[i].T
             for k in range(3):
-                for j in range(3):
-                    w[at + k, j] = R[i, j, k]
                 _cross(r, w[at + k], d[at + k])
         else:
             for j in range(3):
@@ -184,14 +177,10 @@ def _columns(R, p, tree, d, w):
 
 @compiled
 def _gather(residuals, measured, base, tree, task, sums):
-    """Sums over each segment's own markers, then over all that hang on it."""
-    sums.weight[:] = 0.0
-    sums.first[:] = 0.0
-    sums.second[:] = 0.0
-    sums.force[:] = 0.0
-    sums.moment[:] = 0.0
-    sums.product[:] = 0.0
-    x, moment = np.empty(3), np.empty(3)
+    """Fill sums (n, 4, 10) over the markers on each segment and beyond: weighted products of (x, 1)
+    and (x, 1, r, x x r) of places x from the base's origin and residuals r."""
+    sums[:] = 0.0
+    row = np.ones(10)
     for m in range(task.weights.size):
         if np.isnan(residuals[m, 0]):
             continue
@@ -200,26 +189,13 @@ def _gather(residuals, measured, base, tree, task, sums):
         trust = 1.0 if distance <= task.limit else (task.limit / distance) ** 2
         weight = task.weights[m] * trust
         for j in range(3):
-            x[j] = measured[m, j] - r[j] - base[j]
-        _cross(x, r, moment)
-        sums.weight[i] += weight
-        for j in range(3):
-            sums.first[i, j] += weight * x[j]
-            sums.force[i, j] += weight * r[j]
-            sums.moment[i, j] += weight * moment[j]
-            for k in range(3):
-                sums.second[i, j, k] += weight * x[j] * x[k]
-                sums.product[i, j, k] += weight * x[j] * r[k]
+            row[j], row[4 + j] = measured[m, j] - r[j] - base[j], r[j]
+        _cross(row[:3], r, row[7:])
+        for j in range(4):
+            for k in range(10):
+                sums[i, j, k] += weight * row[j] * row[k]
     for i in range(tree.kinds.size - 1, 0, -1):
-        a = tree.parents[i]
-        sums.weight[a] += sums.weight[i]
-        for j in range(3):
-            sums.first[a, j] += sums.first[i, j]
-            sums.force[a, j] += sums.force[i, j]
-            sums.moment[a, j] += sums.moment[i, j]
-            for k in range(3):
-                sums.second[a, j, k] += sums.second[i, j, k]
-                sums.product[a, j, k] += sums.product[i, j, k]
+        sums[tree.parents[i]] += sums[i]
 
 
 @compiled
@@ -229,35 +205,27 @@ def _assemble(d, w, sums, q, tree, task, H, g):
     F, T = np.empty(3), np.empty(3)
     for k in range(g.size):
         i = tree.v_segments[k]
-        S, first = sums.second[i], sums.first[i]
+        S = sums[i]
         trace = S[0, 0] + S[1, 1] + S[2, 2]
-        _cross(w[k], first, F)
-        _cross(first, d[k], T)
+        _cross(w[k], S[:3, 3], F)
+        _cross(S[:3, 3], d[k], T)
+        g[k] = 0.0
         for j in range(3):
-            F[j] += sums.weight[i] * d[k, j]
+            F[j] += S[3, 3] * d[k, j]
             T[j] += trace * w[k, j]
             for b in range(3):
                 T[j] -= S[j, b] * w[k, b]
-        g[k] = 0.0
-        for j in range(3):
-            g[k] += d[k, j] * sums.force[i, j] + w[k, j] * sums.moment[i, j]
+            g[k] += d[k, j] * S[3, 4 + j] + w[k, j] * S[3, 7 + j]
         a = k
         while a >= 0:
             H[k, a] = 0.0
             for j in range(3):
                 H[k, a] += d[a, j] * F[j] + w[a, j] * T[j]
             a = tree.v_parents[a]
-    turn = np.empty(3)
-    for i in range(1, tree.kinds.size):
-        at, av = tree.q_starts[i], tree.v_starts[i]
-        if tree.kinds[i] == SPHERICAL:
-            _rotation_vector(q[at : at + 4], turn)
-            for j in range(3):
-                H[av + j, av + j] += task.prior[av + j]
-                g[av + j] -= task.prior[av + j] * turn[j]
-        else:
-            H[av, av] += task.prior[av]
-            g[av] -= task.prior[av] * q[at]
+    angles = _angles(q, tree)
+    for k in range(6, angles.size):
+        H[k, k] += task.prior[k]
+        g[k] -= task.prior[k] * angles[k]
 
 
 @compiled
@@ -270,9 +238,9 @@ def _bend(d, w, sums, tree, N, H):
     """
     for k in range(len(d)):
         i = tree.v_segments[k]
-        M = sums.product[i]
+        M = sums[i, :3, 4:7]
         trace = M[0, 0] + M[1, 1] + M[2, 2]
-        _cross(d[k], sums.force[i], N[k])
+        _cross(d[k], sums[i, 3, 4:7], N[k])
         for j in range(3):
             N[k, j] -= trace * w[k, j]
             for b in range(3):
@@ -291,51 +259,37 @@ def _bend(d, w, sums, tree, N, H):
 
 
 @compiled
-def _factor(H, damping, v_parents, L):
+def _factor(H, damping, L):
     """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
 
     Returns whether the matrix is positive definite.
     """
-    definite = True
-    nv = v_parents.size
+    definite, nv = True, len(H)
+    L[:] = H
     for k in range(nv):
-        a = k
-        while a >= 0:
-            L[k, a] = H[k, a]
-            a = v_parents[a]
         L[k, k] += damping * H[k, k] + 1e-12
     for k in range(nv - 1, -1, -1):
         definite &= L[k, k] > 0
         L[k, k] = np.sqrt(max(L[k, k], 1e-12))
-        i = v_parents[k]
-        while i >= 0:
+        for i in range(k):
             L[k, i] /= L[k, k]
-            i = v_parents[i]
-        i = v_parents[k]
-        while i >= 0:
-            j = i
-            while j >= 0:
-                L[i, j] -= L[k, i] * L[k, j]
-                j = v_parents[j]
-            i = v_parents[i]
+        for i in range(k):
+            if L[k, i] != 0.0:
+                for j in range(i + 1):
+                    L[i, j] -= L[k, i] * L[k, j]
     return definite
 
 
 @compiled
-def _solve(L, v_parents, x):
+def _solve(L, x):
     """x <- (L^T L)^-1 x."""
-    nv = v_parents.size
-    for i in range(nv - 1, -1, -1):
+    for i in range(len(x) - 1, -1, -1):
         x[i] /= L[i, i]
-        j = v_parents[i]
-        while j >= 0:
+        for j in range(i):
             x[j] -= L[i, j] * x[i]
-            j = v_parents[j]
-    for i in range(nv):
-        j = v_parents[i]
-        while j >= 0:
+    for i in range(len(x)):
+        for j in range(i - 1, -1, -1):
             x[i] -= L[i, j] * x[j]
-            j = v_parents[j]
         x[i] /= L[i, i]
 
 
@@ -366,15 +320,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     R, p = np.zeros((n, 3, 3)), np.zeros((n, 3))
     d, w = np.zeros((nv, 3)), np.zeros((nv, 3))
     H, g, dv = np.zeros((nv, nv)), np.zeros(nv), np.zeros(nv)
-    N = np.zeros((nv, 3))
-    sums = Sums(
-        np.zeros(n),
-        np.zeros((n, 3)),
-        np.zeros((n, 3, 3)),
-        np.zeros((n, 3)),
-        np.zeros((n, 3)),
-        np.zeros((n, 3, 3)),
-    )
+    N, sums = np.zeros((nv, 3)), np.zeros((n, 4, 10))
     trial, trial_residuals = q.copy(), residuals.copy()
     cost = _evaluate(q, tree, task, measured, R, p, residuals)
     damping, taken = 0.0, -1
@@ -387,10 +333,10 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         if newton:
             _bend(d, w, sums, tree, N, H)
         while damping < 1e6:
-            definite = _factor(H, damping, tree.v_parents, L)
+            definite = _factor(H, damping, L)
             if definite or not newton:
                 dv[:] = g
-                _solve(L, tree.v_parents, dv)
+                _solve(L, dv)
                 _step(q, dv, tree, base, trial)
                 trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
                 if trial_cost <= cost * (1 + 1e-14):
@@ -412,7 +358,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
             taken = step + 1
             break
     _assemble(d, w, sums, q, tree, task, H, g)
-    _factor(H, 0.0, tree.v_parents, L)
+    _factor(H, 0.0, L)
     return taken
 
 
@@ -434,12 +380,9 @@ def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, s
         if np.isnan(markers[frame]).all():
             q[:] = last
         last[:] = q
-        for k in range(nv):
-            sd_out[frame, k] = 1.0 / L[k, k]
-        for m in range(task.weights.size):
-            residual_out[frame, m] = np.sqrt(
-                residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
-            )
+        sd_out[frame] = 1.0 / np.diag(L)
+        x, y, z = residuals[:, 0], residuals[:, 1], residuals[:, 2]
+        residual_out[frame] = np.sqrt(x**2 + y**2 + z**2)
 
 
 @compiled

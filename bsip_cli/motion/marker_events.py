@@ -72,14 +72,6 @@ class _Problem:
         self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
         self.coefficient_sd = coefficient_sd
 
-    def products(self, r: float) -> np.ndarray:
-        """Sum of z z', whitened."""
-        return (1.0 + r * r) * self.squares - r * self.neighbours - r * r * self.ends
-
-    def with_steps(self, r: float) -> np.ndarray:
-        """(p, 1 + k + d) products of z with a step at each place, both whitened."""
-        return (1.0 + r * r) * self.after - r * self.around + r * (1.0 - r) * self.z[-1]
-
     def prior(self, error: float) -> np.ndarray:
         """(1 + k, 1 + k) what the prior adds to the equations."""
         return self.penalised * (error / self.coefficient_sd) ** 2
@@ -120,21 +112,30 @@ def find_level_change(
     if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
     problem = _Problem(y, columns, places, coefficient_sd)
-    correlation = 0.0
+    x = problem.of_x
+    X, square, correlation = problem.z[:, :x], problem.squares[:x, :x], 0.0
     error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
         found = _best(problem, correlation, error)
         if found is None:
             return None
-        correlation = _correlation(problem, found, error)
+        # of neighbours among what columns and step leave, fitted as if there were none
+        stepped = problem.z[:, x:].copy()
+        stepped[found.at :] -= found.step
+        left = stepped - X @ np.linalg.solve(square + problem.prior(error), X.T @ stepped)
+        power = float((left[:-1] ** 2).sum())
+        value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
+        correlation = float(np.clip(value, 0.0, _LARGEST_CORRELATION))
         error = max(found.spread * np.sqrt(1.0 - correlation**2), _LEAST_ERROR)
     return _best(problem, correlation, error)
 
 
 def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:
-    n, x = len(problem.z), problem.of_x
+    n, x, r = len(problem.z), problem.of_x, correlation
     d = problem.z.shape[1] - x
-    products, steps = problem.products(correlation), problem.with_steps(correlation)
+    # Whitened: the sum of z z', and (p, 1 + k + d) products of z with a step at each place.
+    products = (1.0 + r * r) * problem.squares - r * problem.neighbours - r * r * problem.ends
+    steps = (1.0 + r * r) * problem.after - r * problem.around + r * (1.0 - r) * problem.z[-1]
     inverse = np.linalg.inv(products[:x, :x] + problem.prior(error))
     coefficients = inverse @ products[:x, x:]
     # What the columns leave of the signal and of the steps: the gain of each step follows.
@@ -158,19 +159,6 @@ def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | 
         spread=float(np.sqrt(variance / (1.0 - correlation**2))),
         z=float(np.sqrt(z2)),
     )
-
-
-def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
-    """Of neighbours among what columns and step leave, fitted as if there were none."""
-    x = problem.of_x
-    stepped = problem.z[:, x:].copy()
-    stepped[found.at :] -= found.step
-    X = problem.z[:, :x]
-    system = problem.squares[:x, :x] + problem.prior(error)
-    left = stepped - X @ np.linalg.solve(system, X.T @ stepped)
-    power = float((left[:-1] ** 2).sum())
-    value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
-    return float(np.clip(value, 0.0, _LARGEST_CORRELATION))
 
 
 # --- markers that are misplaced since the calibration, throughout a trial or from a moment on -----

@@ -133,17 +133,24 @@ def jumps(
     same frame (at an impact all shake), and of the noise; half of it comes or goes within two
     frames, and the measured path shows it.
     """
-    away = _away(residual, 2 * max(2, round(0.5 * _WINDOW_S / fit.step_s())) + 1)
+    longest, away = round(0.5 * _WINDOW_S / fit.step_s()), np.full(residual.shape, np.nan)
+    width = 2 * max(2, longest) + 1  # of the running median over the visible frames
+    for m in range(residual.shape[1]):
+        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
+        if len(seen) >= _LEAST_FRAMES:
+            window = min(width, len(seen) | 1)
+            for axis in range(residual.shape[2]):  # one-dimensional, it costs a tenth
+                own = residual[seen, m, axis]
+                away[seen, m, axis] = own - median_filter(own, size=window, mode="nearest")
     distance = np.linalg.norm(away, axis=2)
     astray = np.zeros(distance.shape, dtype=bool)
     if not np.isfinite(distance).any():
         return [], astray
-    own = _median(distance, 0)[None] / MEDIAN_LENGTH
-    frame = _median(distance, 1)[:, None] / MEDIAN_LENGTH
+    own = _median(distance, 0) / MEDIAN_LENGTH
+    frame = _median(distance, 1) / MEDIAN_LENGTH
     spread = np.maximum(np.maximum(own, frame), fit.noise_m())
     with np.errstate(invalid="ignore"):
         beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
-    longest = round(0.5 * _WINDOW_S / fit.step_s())
     found = []
     for m in range(len(fit.labels)):
         for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
@@ -184,25 +191,10 @@ def _own(
     return own
 
 
-def _away(residual: np.ndarray, width: int) -> np.ndarray:
-    """Residual less its running median over the visible frames, NaN where missing."""
-    away = np.full(residual.shape, np.nan)
-    for m in range(residual.shape[1]):
-        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
-        if len(seen) >= _LEAST_FRAMES:
-            size = min(width, len(seen) | 1)
-            for axis in range(residual.shape[2]):  # one-dimensional, it costs a tenth
-                own = residual[seen, m, axis]
-                away[seen, m, axis] = own - median_filter(own, size=size, mode="nearest")
-    return away
-
-
 def _median(distance: np.ndarray, axis: int) -> np.ndarray:
-    seen = np.isfinite(distance).any(axis=axis)
-    out = np.zeros(len(seen))
-    kept = distance[:, seen] if axis == 0 else distance[seen]
-    out[seen] = np.nanmedian(kept, axis=axis)
-    return out
+    """Along an axis, which stays; 0 where nothing is known."""
+    seen = np.isfinite(distance).any(axis=axis, keepdims=True)
+    return np.nanmedian(np.where(seen, distance, 0.0), axis=axis, keepdims=True)
 
 
 def _is_own(fit: MarkerFit, m: int, piece: slice, distance: np.ndarray) -> bool:
@@ -246,14 +238,6 @@ _LEAST_RESPONSE = 0.003  # what follows a slip by less says nothing of it
 _MOST = 12
 
 
-class _Found(NamedTuple):
-    """A change of level of marker ``m`` at a block."""
-
-    m: int
-    change: LevelChange
-    block: int
-
-
 class _Slip(NamedTuple):
     m: int
     frame: int
@@ -274,51 +258,51 @@ class _Search:
             for name, x in fit.pose.items()
         }
         self.means = block_means(self.left, self.frames)
-        self.best: dict[int, _Found | None] = {}
+        self.best: dict[int, LevelChange | None] = {}
 
-    def changes(self) -> list[_Found]:
-        """The changes that are slips, of all markers."""
+    def changes(self) -> dict[int, LevelChange]:
+        """The changes that are slips, by marker, each at its block."""
         for m in range(len(self.fit.labels)):
             if m not in self.best:
                 self.best[m] = self._change(m, self.least)
-        found = [(f, np.linalg.norm(f.change.step)) for f in self.best.values() if f]
-        return [
-            f
-            for f, size in found
-            if f.change.z > _CHANCE
-            and size > 0.5 * BEYOND * self.fit.trusted_m[f.m]  # the pose takes its part
-            and size > _SLIP * f.change.spread
-        ]
+        return {
+            m: one
+            for m, one in self.best.items()
+            if one and one.z > _CHANCE
+            # the pose takes its part
+            if np.linalg.norm(one.step) > 0.5 * BEYOND * self.fit.trusted_m[m]
+            if np.linalg.norm(one.step) > _SLIP * one.spread
+        }
 
-    def _change(self, m: int, least: int, block: int | None = None) -> _Found | None:
+    def _change(self, m: int, least: int, block: int | None = None) -> LevelChange | None:
         seen = np.flatnonzero(np.isfinite(self.means[:, m, 0]))
         at = None if block is None else int(np.searchsorted(seen, block))
         if len(seen) < 2 * least:
             return None
         columns = self.columns[self.fit.segments[m]][seen]
         found = find_level_change(self.means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
-        return _Found(m, found, int(seen[found.at])) if found else None
+        return replace(found, at=int(seen[found.at])) if found else None
 
-    def source(self, first: _Found, changes: list[_Found]) -> tuple[_Slip, np.ndarray]:
+    def source(self, first: int, changes: dict[int, LevelChange]) -> tuple[_Slip, np.ndarray]:
         """Whose slip makes the strongest change, and the change it makes of all (m, 3)."""
-        fit = self.fit
+        fit, strongest = self.fit, changes[first]
         field, sd = np.full((len(fit.labels), 3), np.nan), np.full(len(fit.labels), np.nan)
-        near = {f.m: f for f in changes if abs(f.block - first.block) <= self.least}
+        near = {m: f for m, f in changes.items() if abs(f.at - strongest.at) <= self.least}
         reach = np.abs(fit.response[:, :, list(near)]).max(axis=(1, 2, 3))
         for k in np.flatnonzero(reach > _LEAST_RESPONSE):
-            found = self._change(int(k), 1, first.block)
+            found = self._change(int(k), 1, strongest.at)
             if found:
-                field[k], sd[k] = found.change.step, found.change.step_sd
-        near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first.m: first}
-        field[first.m], sd[first.m] = first.change.step, first.change.step_sd
-        sd = np.hypot(sd, 0.1 * np.linalg.norm(first.change.step))
+                field[k], sd[k] = found.step, found.step_sd
+        near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first: strongest}
+        field[first], sd[first] = strongest.step, strongest.step_sd
+        sd = np.hypot(sd, 0.1 * np.linalg.norm(strongest.step))
         m, vector = best_source(fit.response, field, sd, list(near))
-        frame = self._frame(near[m])
+        frame = self._frame(m, near[m])
         made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
         left = np.linalg.norm(field - made, axis=1)
         same = left < _SAME_SHARE * np.linalg.norm(field, axis=1)
         same[m] = True
-        return _Slip(m, frame, vector, near[m].change.z), np.where(same[:, None], field, made)
+        return _Slip(m, frame, vector, near[m].z), np.where(same[:, None], field, made)
 
     def take(self, slip: _Slip, made: np.ndarray) -> None:
         """Take a slip out of the residuals."""
@@ -327,10 +311,10 @@ class _Search:
         moved = np.linalg.norm(made, axis=1) > 0.1 * self.fit.trusted_m
         self.best = {k: f for k, f in self.best.items() if not moved[k]}
 
-    def _frame(self, found: _Found) -> int:
+    def _frame(self, m: int, found: LevelChange) -> int:
         """First frame at the new level: the split near the block with the least squares."""
-        step, middle = found.change.step, found.block * self.frames
-        along = self.left[:, found.m] @ step / (step @ step)
+        step, middle = found.step, found.at * self.frames
+        along = self.left[:, m] @ step / (step @ step)
         near = np.arange(middle - 2 * self.frames, middle + 2 * self.frames + 1)
         near = near[(near > 0) & (near < len(along))]
         near = near[np.isfinite(along[near])]
@@ -351,7 +335,7 @@ def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.n
         changes = search.changes()
         if not changes:
             break
-        slip, made = search.source(max(changes, key=lambda one: one.change.z), changes)
+        slip, made = search.source(max(changes, key=lambda m: changes[m].z), changes)
         search.take(slip, made)
         if np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]:
             found.append(slip)

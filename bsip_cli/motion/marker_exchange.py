@@ -55,14 +55,15 @@ def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
     return np.take_along_axis(markers, order.reshape(*order.shape, *[1] * (markers.ndim - 2)), 1)
 
 
-def with_exchanges(fit: MarkerFit, exchanges: Sequence[Exchange]) -> np.ndarray:
-    """(N, m, 3) the markers with these labels exchanged."""
-    return exchanged(fit.measured_m, _order(fit, exchanges))
-
-
-def refitted(fit: MarkerFit, refit: Refit, exchanges: Sequence[Exchange]) -> MarkerFit:
-    """The poses fitted again with these labels exchanged."""
-    return refit(with_exchanges(fit, exchanges), fit.times_s)
+def refitted(
+    fit: MarkerFit,
+    refit: Refit,
+    exchanges: Sequence[Exchange],
+    frames: slice | np.ndarray = slice(None),
+) -> MarkerFit:
+    """The poses fitted again, to all or some frames, with these labels exchanged."""
+    markers = exchanged(fit.measured_m, _order(fit, exchanges))
+    return refit(markers[frames], fit.times_s[frames])
 
 
 _FRAMES = 24  # that show which exchanges are the likeliest
@@ -81,7 +82,7 @@ def best_fitting(
     frames = some_frames(fit)
     misfits = []
     for exchanges in tried:
-        again = refit(with_exchanges(fit, exchanges)[frames], fit.times_s[frames])
+        again = refitted(fit, refit, exchanges, frames)
         misfits.append((misfit_m(again.distance_m()), exchanges))
     return min(misfits, key=lambda one: one[0])
 

@@ -46,34 +46,31 @@ def doubts_about(
     ``q`` (N, nq) are poses of some frames; ``height_m`` is the stated height, None if there is
     none; ``mass_kg`` is NaN where it is not known.
     """
-    stature = height_m or _stature_m(person, sex)
-    return [
-        *_about_stature(person, sex, height_m),
-        *_about_lengths(person, sex, stature),
-        *_about_sides(person),
-        *_about_mass(mass_kg, stature),
-        *_about_joints(person, q),
-    ]
-
-
-def _stature_m(person: Person, sex: str) -> float:
-    """From the long segments."""
     rows = np.array(person.skeleton.table_rows)
-    return stature_m(sex, {row: float(person.lengths_m[rows == row].mean()) for row in _LONG})
-
-
-def _about_stature(person: Person, sex: str, height_m: float | None) -> Iterator[Doubt]:
-    if height_m is None:
-        return
-    own = _stature_m(person, sex)
-    ratio = max(own / height_m, height_m / own)
-    if ratio > _STATURE:
-        yield Doubt(
-            f"a trunk and legs of a person {own:.2f} m tall",
-            f"the stated {height_m:.2f} m",
-            "the unit of the markers, the height in participants.tsv, or labels on wrong segments",
-            ratio > _NO_STATURE,
+    own = stature_m(sex, {row: float(person.lengths_m[rows == row].mean()) for row in _LONG})
+    stature = height_m or own
+    doubts, index = [], mass_kg / stature**2
+    if height_m is not None and (ratio := max(own / height_m, height_m / own)) > _STATURE:
+        doubts.append(
+            Doubt(
+                f"a trunk and legs of a person {own:.2f} m tall",
+                f"the stated {height_m:.2f} m",
+                "the unit of the markers, the height in participants.tsv, or labels on wrong "
+                "segments",
+                ratio > _NO_STATURE,
+            )
         )
+    doubts += [*_about_lengths(person, sex, stature), *_about_sides(person)]
+    if np.isfinite(index) and not _BMI[0] <= index <= _BMI[1]:
+        doubts.append(
+            Doubt(
+                f"{mass_kg:.1f} kg at {stature:.2f} m, a body-mass index of {index:.0f} kg/m2",
+                f"{_BMI[0]:g} to {_BMI[1]:g} kg/m2",
+                "the unit of the mass, of the height or of the markers",
+                False,
+            )
+        )
+    return [*doubts, *_about_joints(person, q)]
 
 
 def _about_lengths(person: Person, sex: str, stature: float) -> Iterator[Doubt]:
@@ -101,17 +98,6 @@ def _about_sides(person: Person) -> Iterator[Doubt]:
                 "a label on the wrong place on one side",
                 False,
             )
-
-
-def _about_mass(mass_kg: float, stature: float) -> Iterator[Doubt]:
-    index = mass_kg / stature**2
-    if np.isfinite(index) and not _BMI[0] <= index <= _BMI[1]:
-        yield Doubt(
-            f"{mass_kg:.1f} kg at {stature:.2f} m, a body-mass index of {index:.0f} kg/m2",
-            f"{_BMI[0]:g} to {_BMI[1]:g} kg/m2",
-            "the unit of the mass, of the height or of the markers",
-            False,
-        )
 
 
 def _about_joints(person: Person, q: np.ndarray) -> Iterator[Doubt]:

@@ -132,24 +132,12 @@ def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Po
     return concatenated(parts)
 
 
-def _frame_weight(frames: int, options: ScalingOptions) -> float:
-    return min(1.0, options.independent_frames / frames)
-
-
-def _marker_weights(poses: Poses, person: Person, options: ScalingOptions, ik: dict) -> np.ndarray:
-    """(N, m) weights [1/m2], less beyond the robust limit; zero where missing."""
-    limit = ik["robust_limit_m"]
-    distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
-    trust = np.minimum(1.0, limit / np.maximum(distance, 1e-12)) ** 2
-    base = person.marker_weights / ik["marker_sd_m"] ** 2
-    return trust * base * _frame_weight(len(poses.q), options)
-
-
 def _total_cost(poses, person, x, precision, options, ik) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
     far = np.maximum(d, limit)
     loss = np.where(d <= limit, 0.5 * d**2, limit**2 * (0.5 + np.log(far / limit)))
-    weights = person.marker_weights / ik["marker_sd_m"] ** 2 * _frame_weight(len(d), options)
+    frame_weight = min(1.0, options.independent_frames / len(d))
+    weights = person.marker_weights / ik["marker_sd_m"] ** 2 * frame_weight
     return float((loss * weights).sum() + 0.5 * x @ precision @ x)
 
 
@@ -269,7 +257,11 @@ def _reduced_equations(
     tree = tree_of(person)
     R, p = tree.forward(poses.q)
     model = model_markers(person, R, p)
-    root = np.sqrt(_marker_weights(poses, person, options, ik))[..., None]
+    # weights [1/m2], less beyond the robust limit; zero where missing
+    distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
+    trust = np.minimum(1.0, ik["robust_limit_m"] / np.maximum(distance, 1e-12)) ** 2
+    base = person.marker_weights / ik["marker_sd_m"] ** 2
+    root = np.sqrt(trust * base * min(1.0, options.independent_frames / len(poses.q)))[..., None]
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
     below = subtrees(person)
     by_pose = pose_columns(tree, R, p, model, below) * root[..., None]

@@ -131,7 +131,12 @@ def smooth_motion(
     joint_of_curve = np.repeat(
         np.arange(len(skeleton.joints)), np.diff([*skeleton.q_starts, q.shape[1]])
     )
-    curves = np.where(known[:, joint_of_curve], _continuous(skeleton, q), np.nan)
+    smooth_q = q.copy()
+    for part in _quaternions(skeleton):  # signs chosen so that they do not jump
+        x = smooth_q[:, part]
+        signs = np.sign(np.einsum("fi,fi->f", x[1:], x[:-1]))
+        x[1:] *= np.cumprod(np.where(signs == 0, 1.0, signs))[:, None]
+    curves = np.where(known[:, joint_of_curve], smooth_q, np.nan)
     marker_noise, noise = _noise(person, curves, whole, rate_hz)
     if method == "spline":
         pose_known = np.where(whole[:, None, None], markers, np.nan)
@@ -191,16 +196,6 @@ def _blocks(skeleton: Skeleton) -> Iterator[tuple[slice, slice, int, float]]:
             yield slice(at, at + 1), slice(av, av + 1), 1, 1.0
 
 
-def _continuous(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    """q with the quaternions' signs chosen so that they do not jump."""
-    out = q.copy()
-    for part in _quaternions(skeleton):
-        x = out[:, part]
-        signs = np.sign(np.einsum("fi,fi->f", x[1:], x[:-1]))
-        x[1:] *= np.cumprod(np.where(signs == 0, 1.0, signs))[:, None]
-    return out
-
-
 def _quaternions(skeleton: Skeleton) -> list[slice]:
     return [part for part, _, count, _ in _blocks(skeleton) if count == 4]
 
@@ -236,8 +231,13 @@ def _on_manifold(
         elif count == 4:
             q[:, part], *found = _angular(s, part)
         else:  # of the base, whose turning is there already
-            turn, omega = q[:, part.stop : part.stop + 4], v[:, turning.stop : turning.stop + 3]
-            found = _linear(s, part, turn, omega)
+            # velocity and acceleration in its own axes (Pinocchio's spatial ones)
+            u, w = -q[:, part.stop : part.stop + 3], q[:, part.stop + 3 : part.stop + 4]
+            omega, in_body = v[:, turning.stop : turning.stop + 3], []
+            for vectors in (s.first[:, part], s.second[:, part]):
+                t = 2 * np.cross(u, vectors)
+                in_body.append(vectors + w * t + np.cross(u, t))
+            found = [in_body[0], in_body[1] - np.cross(omega, in_body[0]), s.second_sd[:, part]]
         v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 
@@ -261,13 +261,3 @@ def _imaginary(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(N, 3) vector part of conj(x) * y; quaternions as x, y, z, w."""
     u, w, p, r = x[:, :3], x[:, 3:], y[:, :3], y[:, 3:]
     return w * p - r * u - np.cross(u, p)
-
-
-def _linear(s: SmoothSignal, part: slice, quaternion: np.ndarray, omega: np.ndarray):
-    """Velocity and acceleration of the base in its own axes (Pinocchio's spatial ones)."""
-    u, w, in_body = -quaternion[:, :3], quaternion[:, 3:], []
-    for vectors in (s.first[:, part], s.second[:, part]):
-        t = 2 * np.cross(u, vectors)
-        in_body.append(vectors + w * t + np.cross(u, t))
-    velocity, acceleration = in_body
-    return velocity, acceleration - np.cross(omega, velocity), s.second_sd[:, part]

@@ -101,15 +101,21 @@ def smooth(
     seen = np.isfinite(samples)
     offset = np.nanmean(samples, axis=0)
     scaled = (bridged(samples) - offset) / sigma
-    groups = _alike(seen)
-    first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
+    groups: dict[bytes, list[int]] = {}  # channels that miss the same samples, together
+    for k in range(samples.shape[1]):
+        groups.setdefault(seen[:, k].tobytes(), []).append(k)
+    first = max(groups.values(), key=lambda columns: seen[:, columns[0]].sum())
     penalty = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
-    for columns in groups:
+    # The skin's part has as much power at all frequencies that pass: the value's variance times it.
+    skins = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
+    for columns in groups.values():
         weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
         right = basis.values.T @ (weights[:, None] * scaled[:, columns])
         c[:, columns], inverse = _fit(_normal(basis, weights), penalty, right)
-        spread[:, columns] = np.outer(_curve_sd(basis, penalty, inverse), sigma[columns])
+        white = _variances(basis.curves, inverse)
+        of_curve = np.sqrt(white + skins * _variances(basis.values, inverse))
+        spread[:, columns] = np.outer(of_curve, sigma[columns])
     c *= sigma
     return SmoothSignal(
         basis.values @ c + offset,
@@ -118,14 +124,6 @@ def smooth(
         spread,
         _cutoff_hz(basis, penalty),
     )
-
-
-def _alike(seen: np.ndarray) -> list[list[int]]:
-    """Channels (columns) that miss the same samples, together."""
-    groups: dict[bytes, list[int]] = {}
-    for k in range(seen.shape[1]):
-        groups.setdefault(seen[:, k].tobytes(), []).append(k)
-    return list(groups.values())
 
 
 def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -154,20 +152,17 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     density = (power[inside] / gain[:, None, None]).mean(axis=0)
     # The lower third of such a mean lies below it; a Hann window ties neighbouring frequencies.
     freedom = 2 * inside.sum() / 1.9
-    whole = _whole_windows(samples, (t * rate_hz - 0.5 * width).round().astype(int), width)
+    # Windows with bridged samples, whose noise is nil, count only where there are no others.
+    missing = np.concatenate([[0], np.cumsum(~np.isfinite(samples).all(axis=1))])
+    first = (t * rate_hz - 0.5 * width).round().astype(int)
+    last = np.minimum(first + width + _NOISE_ORDER, len(samples))
+    whole = missing[last] == missing[first]
+    whole |= not whole.any()
     level = np.sqrt(
         np.quantile(density[:, whole], 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
     )
     scale = np.abs(whole_curves).max(axis=0)
     return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
-
-
-def _whole_windows(samples: np.ndarray, first: np.ndarray, width: int) -> np.ndarray:
-    """Which windows hold no bridged sample, whose noise is nil; all of them where none does."""
-    missing = np.concatenate([[0], np.cumsum(~np.isfinite(samples).all(axis=1))])
-    last = np.minimum(first + width + _NOISE_ORDER, len(samples))
-    whole = missing[last] == missing[first]
-    return whole if whole.any() else np.ones(len(first), dtype=bool)
 
 
 def bridged(samples: np.ndarray) -> np.ndarray:
@@ -189,19 +184,16 @@ class _Basis:
         self.intervals = max(int(np.ceil(self.x[-1])), 1)
         self.per_s = rate_hz / samples_per_knot
         self.size = self.intervals + _DEGREE
-        self.values, self.slopes, self.curves = map(self._derivative, range(3))
-
-    def _derivative(self, order: int) -> sparse.csr_array:
-        """Basis of degree 5 - order on the same knots, times the differences of that order."""
-        degree = _DEGREE - order
-        knots = np.arange(-degree, self.intervals + degree + 1, dtype=float)
-        basis = sparse.csr_array(BSpline.design_matrix(self.x, knots, degree))
-        signs = {0: [1.0], 1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0]}[order]
-        size = self.size - order
-        differences = sparse.diags_array(
-            [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
-        )
-        return sparse.csr_array(basis @ differences) * self.per_s**order
+        matrices = []  # basis of degree 5 - order on the same knots, times differences of an order
+        for order, signs in enumerate(([1.0], [-1.0, 1.0], [1.0, -2.0, 1.0])):
+            degree, size = _DEGREE - order, self.size - order
+            knots = np.arange(-degree, self.intervals + degree + 1, dtype=float)
+            basis = sparse.csr_array(BSpline.design_matrix(self.x, knots, degree))
+            differences = sparse.diags_array(
+                [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
+            )
+            matrices.append(sparse.csr_array(basis @ differences) * self.per_s**order)
+        self.values, self.slopes, self.curves = matrices
 
     def power(self, omega: np.ndarray) -> np.ndarray:
         """Gain of B^T B far from the ends at these frequencies (radians per knot)."""
@@ -253,16 +245,6 @@ def _skin_share(stiffness: np.ndarray, basis: _Basis, skin: SkinNoise | None) ->
     corner, lowest = (2 * np.pi * f / basis.per_s for f in (skin.corner_hz, skin.from_hz))
     share = corner**4 / float(np.mean(1.0 / stiffness))
     return min(share, basis.samples_per_knot / lowest**4)
-
-
-def _curve_sd(basis: _Basis, penalty: _Penalty, inverse: np.ndarray) -> np.ndarray:
-    """(N,) sd of the second derivative over that of the white noise.
-
-    The skin's part has as much power at all frequencies that pass: the value's variance times it.
-    """
-    skin = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
-    white = _variances(basis.curves, inverse)
-    return np.sqrt(white + skin * _variances(basis.values, inverse))
 
 
 def _cutoff_hz(basis: _Basis, penalty: _Penalty) -> np.ndarray:

@@ -289,7 +289,12 @@ def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np
     height, dt = plan.com_height_m.copy(), plan.step_s
     if not plan.all_loads():
         return height
-    for (first, last), (before, after) in zip(plan.flights, _stances(plan), strict=True):
+    # samples on the ground before, between and after the flights that serve as bridges
+    longest, edges = round(LONGEST_BRIDGE_S / dt), [-1, *np.ravel(plan.flights), len(plan)]
+    ground = zip(edges[::2], edges[1::2], strict=True)
+    stances = pairwise(min(longest, landed - left - 1) for left, landed in ground)
+    rest, times = np.zeros(4), np.arange(longest) * dt
+    for (first, last), (before, after) in zip(plan.flights, stances, strict=True):
         sink = -load_force[first : last + 1, 1] / momentum.mass_kg
         speed = integral(sink, dt)
         speed = speed - speed[-1]
@@ -299,24 +304,12 @@ def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np
         k = HALF_WIDTH + 1  # next to the edges, where differences reach out of the flight
         takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * dt)])
         landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * dt)])
-        height[first - before : first] += _from_rest(takeoff, before, dt)
+        height[first - before : first] += bridge(rest, takeoff, before * dt, times[:before])
         # the same bridge, run backwards in time
-        landed = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
+        backwards = landing * [1.0, -1.0, 1.0, -1.0]
+        landed = bridge(rest, backwards, after * dt, times[:after])
         height[last + 1 : last + 1 + after] += landed[::-1]
     return height
-
-
-def _from_rest(end: np.ndarray, samples: int, step_s: float) -> np.ndarray:
-    """(samples,) a `bridge` from nothing to a state."""
-    return bridge(np.zeros(4), end, samples * step_s, np.arange(samples) * step_s)
-
-
-def _stances(plan: Plan) -> list[tuple[int, int]]:
-    """For each flight, how many samples on the ground before and after it serve as bridges."""
-    longest = round(LONGEST_BRIDGE_S / plan.step_s)
-    starts = [first for first, _ in plan.flights] + [len(plan)]
-    ends = [-1] + [last for _, last in plan.flights]
-    return list(pairwise(min(longest, a - b - 1) for a, b in zip(starts, ends, strict=True)))
 
 
 def _turn_rate(

@@ -33,26 +33,7 @@ STERNUM_SLOPE_DEG = 25.0
 # 2005), in the width of the thorax; how far it lies from there in people.
 JOINT_FROM_NOTCH = np.array([0.0063, 0.0069, 0.0255]) / 0.136
 JOINT_OFFSET_M = 0.005
-# Travel of a marker against the bone for a large joint movement: light, and as measured.
-SKIN_SIZE_M = {
-    "thigh": (0.014, 0.018),
-    "shank": (0.005, 0.007),
-    "upper_arm": (0.007, 0.007),
-    "forearm": (0.005, 0.005),
-    "thorax": (0.005, 0.012),
-    "clavicle": (0.005, 0.005),
-    "lower_torso": (0.005, 0.012),
-}
-OTHER_SKIN_SIZE_M = (0.0015, 0.0015)
 CURVED_SHARE = 0.5  # travel with the square of a joint's sine, of that with the sine
-SWINGING = {  # share of the segment's mass, and the range of its frequency [Hz]
-    "thigh_l": (0.3, (8.0, 11.0)),
-    "thigh_r": (0.3, (8.0, 11.0)),
-    "shank_l": (0.2, (8.0, 11.0)),
-    "shank_r": (0.2, (8.0, 11.0)),
-    "upper_torso": (0.1, (5.0, 8.0)),
-    "lower_torso": (0.2, (5.0, 8.0)),
-}
 DAMPING_RATIO = (0.2, 0.4)
 MARKER_SHARE = (0.3, 1.0)  # of the tissue's swing that a marker over it shows
 _TERM = re.compile(r"(-?[\d.]+)(?: ([a-z_]+))?")
@@ -110,22 +91,51 @@ class Build:
     hinges: dict[str, np.ndarray]
 
 
-def heel_and_toe_m(foot_length_m: float) -> tuple[float, float]:
-    """X of the heel and of the metatarsal heads from the ankle joint, foot flat."""
-    return -0.27 * foot_length_m, 0.73 * foot_length_m
+@cache
+def table(name: str) -> list[dict[str, str]]:
+    """Rows of a CSV file of this folder."""
+    text = files("bsip_cli.simulate").joinpath(name).read_text(encoding="utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+@cache
+def tissue_of(kind: str) -> dict[str, str]:
+    """Of a body, without its side: how far a marker travels against the bone in a large joint
+    movement, light and as measured; the bones whose turning against it moves the skin (* is the
+    body's side); what of it swings, the share of its mass, and the range of its frequency."""
+    return next(row for row in table("tissue.csv") if row["body"] == kind)
 
 
 def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
     """What swings, by segment; left and right at frequencies of their own."""
-    return {
-        segment: Swing(share, float(rng.uniform(*range_hz)), float(rng.uniform(*DAMPING_RATIO)))
-        for segment, (share, range_hz) in SWINGING.items()
-    }
+    swings = {}
+    for row in table("tissue.csv"):
+        for segment in row["swings"].split():
+            frequency = float(rng.uniform(float(row["from_hz"]), float(row["to_hz"])))
+            damping = float(rng.uniform(*DAMPING_RATIO))
+            swings[segment] = Swing(float(row["share"]), frequency, damping)
+    return swings
 
 
 def place_markers(rng: np.random.Generator, build: Build, richness: Richness) -> dict[str, Marker]:
-    """The 38 markers of a person."""
-    return _skin_markers(_places(build, _regressed(build)), rng, richness)
+    """The 38 markers of a person.
+
+    From those of the thorax (origin CJC), the pelvis (origin at the true LJC) and the shoulders the
+    regressions predict the joint centres wrongly by the drawn errors.
+    """
+    width, (share, angle) = build.widths_m["thorax"], CERVICAL_SHARE[build.sex]
+    c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
+    found = {"C7": c7, "IJ": c7 + width * _in_plane(-STERNUM_SLOPE_DEG)}
+    share, angle = SHOULDER_FROM_ACROMION
+    across = build.widths_m["pelvis"]
+    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * across
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        spines = {"ASIS": [x, y, sign * z], "PSIS": [x - 0.68 * across, y, sign * 0.045]}
+        for name, place in spines.items():
+            found[side.upper() + name] = np.array(place) - build.errors_m["ljc"]
+        shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
+        found[f"{side.upper()}AC"] = shoulder - share * width * _in_plane(angle)
+    return _skin_markers(_places(build, found), rng, richness)
 
 
 def with_girdle(
@@ -162,12 +172,13 @@ def _skin_markers(
         error = richness.placement_error_m * rng.standard_normal(3)
         own = rng.standard_normal((3, 6))
         lag = 1.5e-4 * np.exp(0.3 * rng.standard_normal())
-        size, _ = SKIN_SIZE_M.get(without_side(body), OTHER_SKIN_SIZE_M)
+        size = float(tissue_of(without_side(body))["skin_m"])
         gain = richness.soft_tissue * size * (0.8 * sliding[body] + 0.6 * own) / np.sqrt(3.0)
         lag *= richness.soft_tissue * min(size / 0.007, 1.0)
         markers[label] = Marker(body, position + error, np.hstack([gain, 0.0 * gain]), lag, 0.0)
     for label, marker in markers.items() if richness.measured_tissue else ():
-        usual, size = SKIN_SIZE_M.get(without_side(marker.body), OTHER_SKIN_SIZE_M)
+        tissue = tissue_of(without_side(marker.body))
+        usual, size = float(tissue["skin_m"]), float(tissue["measured_skin_m"])
         straight = marker.skin_gain_m[:, :6] * size / usual
         curved = CURVED_SHARE * richness.soft_tissue * size * rng.standard_normal((3, 6))
         gain = np.hstack([straight, curved / np.sqrt(3.0)])
@@ -178,12 +189,15 @@ def _skin_markers(
 
 def _places(build: Build, found: dict[str, np.ndarray], girdle: str = "no") -> Places:
     """Places by the table, in its order, those of the left side before those of the right one; of
-    rows without numbers as they were found."""
+    rows without numbers as they were found.
+
+    A coordinate is a sum of terms, metres or parts of a size; Z points outwards on each side.
+    """
     places = {}
     for side, sign in (("", 1.0), ("l", -1.0), ("r", 1.0)):
         own = {name.removesuffix(f"_{side}"): size for name, size in build.lengths_m.items()}
         sizes = own | {"ankle_height": build.ankle_height_m, "": 1.0}
-        for row in _rows():
+        for row in table("markers.csv"):
             if row["girdle"] != girdle or ("*" in row["label"]) != bool(side):
                 continue
             label, place = row["label"].replace("*", side.upper()), np.zeros(3)
@@ -197,31 +211,6 @@ def _places(build: Build, found: dict[str, np.ndarray], girdle: str = "no") -> P
     return places
 
 
-@cache
-def _rows() -> list[dict[str, str]]:
-    """A coordinate is a sum of terms, metres or parts of a size; Z points outwards on each side."""
-    table = files("bsip_cli.simulate").joinpath("markers.csv").read_text(encoding="utf-8")
-    return list(csv.DictReader(table.splitlines()))
-
-
 def _in_plane(degrees: float) -> np.ndarray:
     """(3,) unit vector ahead, raised by an angle."""
     return np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees)), 0.0])
-
-
-def _regressed(build: Build) -> dict[str, np.ndarray]:
-    """Landmarks from which the regressions predict the joint centres wrongly by the drawn errors:
-    of the thorax (origin CJC), the pelvis (origin at the true LJC) and the shoulders."""
-    width, (share, angle) = build.widths_m["thorax"], CERVICAL_SHARE[build.sex]
-    c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
-    found = {"C7": c7, "IJ": c7 + width * _in_plane(-STERNUM_SLOPE_DEG)}
-    share, angle = SHOULDER_FROM_ACROMION
-    across = build.widths_m["pelvis"]
-    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * across
-    for side, sign in (("l", -1.0), ("r", 1.0)):
-        spines = {"ASIS": [x, y, sign * z], "PSIS": [x - 0.68 * across, y, sign * 0.045]}
-        for name, place in spines.items():
-            found[side.upper() + name] = np.array(place) - build.errors_m["ljc"]
-        shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
-        found[f"{side.upper()}AC"] = shoulder - share * width * _in_plane(angle)
-    return found

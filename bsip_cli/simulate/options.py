@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
+
+from bsip_cli.files.regular import read_toml
 
 ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
 MORE_TASKS = ("hops", "stepon", "postures")
@@ -114,24 +117,11 @@ class StudyOptions:
         return self.rates.get(task, self.rates.get("default", Rates()))
 
 
-_SLOW, _QUICK = Rates(50, 250), Rates(100, 500)
-_SAMPLE_S = (1.0, 27.0, 2.2, 2.5, 3.4, 3.6, 1.2, 0.8)
-_COHORT_S = (3.0, 120.0, 3.0, 3.0, 8.0, 6.0, 1.2, 0.8)
-_DIAGNOSIS_S = {"static": 3.0, "sequence": 60.0, "squat": 10.0, "hops": 6.0, "stepon": 9.0}
 PRESETS = {
-    # six people, small enough to ship (under 11 MB): slow trials at 50 Hz
-    "sample": StudyOptions(
-        seed=2014,
-        sexes="MFMFMF",
-        durations_s=dict(zip(ALL_TASKS, _SAMPLE_S, strict=True)),
-        rates={"default": _QUICK} | dict.fromkeys(("static", "sequence", "squat", "steps"), _SLOW),
-    ),
-    # twelve people with a two-minute sequence at 100 Hz, as in a full study
-    "cohort": StudyOptions(
-        participants=12, seed=2017, durations_s=dict(zip(ALL_TASKS, _COHORT_S, strict=True))
-    ),
-    # one person for hidden effects: stiff trunk, no ball, landings, and an unloaded plate
-    "diagnosis": StudyOptions(
-        participants=1, seed=2026, tasks=tuple(_DIAGNOSIS_S), durations_s=_DIAGNOSIS_S
-    ),
+    name: StudyOptions(
+        **row
+        | {"tasks": tuple(row["durations_s"])}
+        | {"rates": {task: Rates(*hz) for task, hz in row["rates"].items()}}
+    )
+    for name, row in read_toml(Path(__file__).parent / "presets.toml").items()
 }

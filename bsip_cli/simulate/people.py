@@ -8,10 +8,8 @@ joint centre (LJC), thorax and head at the cervical (CJC), limbs at their proxim
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 import numpy as np
 
@@ -22,6 +20,7 @@ from bsip_cli.simulate.landmarks import (
     Swing,
     draw_tissue,
     place_markers,
+    table,
     with_girdle,
 )
 from bsip_cli.simulate.numerics import from_rotation_vector
@@ -41,6 +40,7 @@ HALF_SHOULDER_WIDTH_M = {"M": 0.178, "F": 0.158}
 # ISB pelvis axes (Dumas and Wojtusch 2018).
 LUMBAR_FROM_ASIS = {"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)}
 HIP_FROM_ASIS = {"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)}
+JOINT_AT_END_OF = {"elbow": "upper_arm", "wrist": "forearm", "knee": "thigh", "ankle": "shank"}
 LIMB_LENGTHS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
 # Standard deviations of the true parameters about the mean person's.
 MASS_SPREAD = {"upper_arm": 0.15, "forearm": 0.15, "hand": 0.15}
@@ -78,18 +78,6 @@ def nearest_physical(tensor: np.ndarray) -> np.ndarray:
     values, axes = np.linalg.eigh(second_moments(tensor))
     values = np.maximum(values, LEAST_SHARE * values.max())
     return tensor_of(axes @ np.diag(values) @ axes.T)
-
-
-def varied_tensor(tensor: np.ndarray, rng: np.random.Generator, share: float) -> np.ndarray:
-    """Another physical tensor; the mean of many is the given one.
-
-    It is that of equal points drawn from a normal distribution with the given second moments
-    (Wishart), so many that each moment has the relative standard deviation `share`. The axes of
-    a slender body turn little, those of a round one freely.
-    """
-    count = max(3, round(2.0 / share**2))
-    points = rng.standard_normal((count, 3)) @ np.linalg.cholesky(second_moments(tensor)).T
-    return tensor_of(points.T @ points / count)
 
 
 def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:
@@ -147,9 +135,8 @@ class MeanSegment:
 @cache
 def mean_segments(sex: str) -> dict[str, MeanSegment]:
     """The mean man's or woman's segments (Dumas 2007, trunk parts 2015), right side."""
-    table = files("bsip_cli.simulate").joinpath("mean_person.csv").read_text(encoding="utf-8")
     segments = {}
-    for row in csv.DictReader(table.splitlines()):
+    for row in table("mean_person.csv"):
         if row["sex"] != sex:
             continue
         radii = {k: float(row[k]) / 100 for k in ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")}
@@ -205,22 +192,8 @@ def _draw_build(rng: np.random.Generator, sex: str, stature: float, richness: Ri
         "thorax": THORAX_WIDTH_M[sex] * size * _factor(rng, 0.05),
         "shoulder": HALF_SHOULDER_WIDTH_M[sex] * size * _factor(rng, 0.03),
     }
-    joints, errors = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
-    hinges = {}
-    for hinge in [f"{joint}_{side}" for joint in ("elbow", "knee") for side in SIDES]:
-        tilt = np.deg2rad(3.0) * richness.hinge_tilt * rng.standard_normal(3)
-        hinges[hinge] = from_rotation_vector(tilt) @ np.array([0.0, 0.0, 1.0])
-    return Build(sex, lengths, widths, 0.045 * stature, joints, errors, hinges)
-
-
-def _draw_joints(
-    rng: np.random.Generator,
-    sex: str,
-    lengths: dict[str, float],
-    widths: dict[str, float],
-    scale: float,
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """True joints in their parents' frames, and how far landmarks mispredict some of them."""
+    # true joints in their parents' frames, and how far landmarks mispredict some of them
+    scale = richness.joint_centre_offset
 
     def offset(size_m: float) -> np.ndarray:
         return scale * size_m * rng.standard_normal(3)
@@ -231,21 +204,23 @@ def _draw_joints(
         "shoulder_l": offset(0.006),
         "shoulder_r": offset(0.006),
     }
-    lumbar = np.array(LUMBAR_FROM_ASIS[sex]) * widths["pelvis"]
-    tjc_x = -0.01 * scale
+    lumbar, tjc_x = np.array(LUMBAR_FROM_ASIS[sex]) * widths["pelvis"], -0.01 * scale
     joints = {
         "tjc": np.array([tjc_x, lengths["abdomen"], 0.0]),
         "cjc": np.array([-tjc_x, lengths["thorax"], 0.0]),
     }
-    ends = {"elbow": "upper_arm", "wrist": "forearm", "knee": "thigh", "ankle": "shank"}
     for side, sign in SIDE_SIGN.items():
         hip = np.array([1.0, 1.0, sign]) * HIP_FROM_ASIS[sex] * widths["pelvis"]
         joints[f"hip_{side}"] = hip + offset(0.0065) - (lumbar + errors["ljc"])
         shoulder_y = -0.045 * lengths["upper_torso"] / 0.477
         joints[f"shoulder_{side}"] = np.array([0.005, shoulder_y, sign * widths["shoulder"]])
-        for joint, body in ends.items():
+        for joint, body in JOINT_AT_END_OF.items():
             joints[f"{joint}_{side}"] = np.array([0.0, -lengths[f"{body}_{side}"], 0.0])
-    return joints, errors
+    hinges = {}
+    for hinge in [f"{joint}_{side}" for joint in ("elbow", "knee") for side in SIDES]:
+        tilt = np.deg2rad(3.0) * richness.hinge_tilt * rng.standard_normal(3)
+        hinges[hinge] = from_rotation_vector(tilt) @ np.array([0.0, 0.0, 1.0])
+    return Build(sex, lengths, widths, 0.045 * stature, joints, errors, hinges)
 
 
 def _draw_inertias(
@@ -275,6 +250,12 @@ def _draw_inertias(
         if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
             com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
         tensor = np.outer(mirror, mirror) * row.tensor * own_mass * length**2
-        tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
+        if scale:
+            # Another physical tensor; the mean of many is this one. It is that of equal points
+            # drawn from a normal distribution with its second moments (Wishart), so many that each
+            # moment has this relative standard deviation. A slender body's axes turn little.
+            root = np.linalg.cholesky(second_moments(tensor))
+            points = rng.standard_normal((max(3, round(2.0 / (0.12 * scale) ** 2)), 3)) @ root.T
+            tensor = tensor_of(points.T @ points / len(points))
         inertias[body] = Inertia(own_mass, com, tensor)
     return inertias

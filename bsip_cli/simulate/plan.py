@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bsip_cli.simulate.landmarks import heel_and_toe_m
 from bsip_cli.simulate.numerics import (
     about_y,
     about_z,
@@ -210,6 +209,7 @@ class Plan:
 MARGIN_S = 0.1  # simulated before and after what is recorded
 STANDING_REACH = 0.9925  # leg length in quiet stance, of the straight leg
 TOE_OUT_RAD = np.deg2rad(8.0)
+HEEL_SHARE, TOE_SHARE = -0.27, 0.73  # of a flat foot: heel, metatarsal heads ahead of the ankle
 SWAY_M = (0.004, 0.003)  # ahead, aside
 
 
@@ -249,18 +249,22 @@ class Sketch:
     def __post_init__(self) -> None:
         n = len(self.t_s)
         self.pelvis_angles = np.zeros((n, 3))
-        self.pelvis_m = np.tile([0.035, self._standing_height_m(), 0.0], (n, 1))
         self.angles = {"waist": np.zeros((n, 3)), "neck": np.zeros((n, 3))}
-        self.feet = {}
+        self.feet, heights, person = {}, [], self.person
         for side in SIDES:
+            # the lumbar joint is as high as the lower hip allows with nearly straight legs
+            leg = person.lengths_m[f"thigh_{side}"] + person.lengths_m[f"shank_{side}"]
+            hip, ankle_m = person.joints_m[f"hip_{side}"], SIDE_SIGN[side] * self.half_stance_m()
+            reach = np.sqrt((STANDING_REACH * leg) ** 2 - (hip[2] - ankle_m) ** 2)
+            heights.append(person.ankle_height_m + reach - hip[1])
             self.angles[f"shoulder_{side}"] = np.zeros((n, 3)) + np.deg2rad([2.0, 12.0, 10.0])
             self.angles[f"elbow_{side}"] = np.zeros(n) + np.deg2rad(16.0)
             self.angles[f"wrist_{side}"] = np.zeros((n, 3)) + np.deg2rad([3.0, 0.0, 70.0])
-            aside, ahead = SIDE_SIGN[side] * self.half_stance_m(), self.mid_foot_m()
             raised, tilt = np.zeros((2, n, 3))
-            still = (np.zeros(n), np.full(n, aside), raised, np.zeros(n), np.zeros(n), tilt)
-            loaded = (np.full(n, 0.5), np.full(n, ahead), np.ones(n, dtype=bool))
+            still = (np.zeros(n), np.full(n, ankle_m), raised, np.zeros(n), np.zeros(n), tilt)
+            loaded = (np.full(n, 0.5), np.full(n, self.mid_foot_m()), np.ones(n, dtype=bool))
             self.feet[side] = FootSketch(*still, *loaded)
+        self.pelvis_m = np.tile([0.035, min(heights), 0.0], (n, 1))
 
     def half_stance_m(self) -> float:
         """Half the distance of the ankles in natural stance."""
@@ -269,17 +273,6 @@ class Sketch:
     def mid_foot_m(self) -> float:
         """Middle of the base of support ahead of the ankle."""
         return 0.25 * self.person.lengths_m["foot_r"]
-
-    def _standing_height_m(self) -> float:
-        """Height of the lumbar joint centre with nearly straight legs."""
-        person, heights = self.person, []
-        for side, sign in SIDE_SIGN.items():
-            leg = person.lengths_m[f"thigh_{side}"] + person.lengths_m[f"shank_{side}"]
-            hip = person.joints_m[f"hip_{side}"]
-            aside = hip[2] - sign * self.half_stance_m()
-            reach = np.sqrt((STANDING_REACH * leg) ** 2 - aside**2)
-            heights.append(person.ankle_height_m + reach - hip[1])
-        return float(min(heights))
 
     def shift_load(self, side: str, part: np.ndarray) -> None:
         """Move a part (T,) of the body's weight from one foot to the other one."""
@@ -291,6 +284,23 @@ class Sketch:
 
     def plan(self, **options: Any) -> Plan:
         """Freeze the sketch; `options` are further fields of `Plan`."""
+        feet = {}
+        for side, foot in self.feet.items():  # as the path of its ankle, and its frame
+            length = self.person.lengths_m[f"foot_{side}"]
+            toe_turn, heel_turn = about_z(-foot.toe_roll_rad), about_z(foot.heel_roll_rad)
+            ankle = np.broadcast_to([0.0, self.person.ankle_height_m, 0.0], foot.raised_m.shape)
+            for share, turn in ((TOE_SHARE, toe_turn), (HEEL_SHARE, heel_turn)):
+                pivot = np.array([share * length, 0.0, 0.0])
+                ankle = pivot + rotate(turn, ankle - pivot)
+            yaw = about_y(np.full(1, -SIDE_SIGN[side] * TOE_OUT_RAD))[0]
+            base = np.stack([foot.ahead_m, np.zeros_like(foot.ahead_m), foot.aside_m], axis=1)
+            feet[side] = Foot(
+                position_m=base + foot.raised_m + rotate(yaw, ankle),
+                rotation=yaw @ heel_turn @ toe_turn @ euler_zxy(foot.tilt_rad),
+                share=foot.share,
+                cop_m=base[:, [0, 2]] + yaw[[0, 2], 0] * foot.cop_ahead_m[:, None],
+                on_plate=foot.on_plate,
+            )
         start = self.sample_of(self.recorded_s[0])
         samples = round((self.recorded_s[1] - self.recorded_s[0]) / STEP_S)
         return Plan(
@@ -298,28 +308,9 @@ class Sketch:
             angles_rad=self.angles,
             pelvis_angles_rad=self.pelvis_angles,
             pelvis_m=self.pelvis_m,
-            feet={side: self._foot(side) for side in SIDES},
+            feet=feet,
             keep=slice(start, start + samples),
             **options,
-        )
-
-    def _foot(self, side: str) -> Foot:
-        """The sketched foot as a path of its ankle and frame."""
-        foot = self.feet[side]
-        heel, toe = heel_and_toe_m(self.person.lengths_m[f"foot_{side}"])
-        toe_turn, heel_turn = about_z(-foot.toe_roll_rad), about_z(foot.heel_roll_rad)
-        ankle = np.broadcast_to([0.0, self.person.ankle_height_m, 0.0], foot.raised_m.shape)
-        for pivot_m, turn in ((toe, toe_turn), (heel, heel_turn)):
-            pivot = np.array([pivot_m, 0.0, 0.0])
-            ankle = pivot + rotate(turn, ankle - pivot)
-        yaw = about_y(np.full(1, -SIDE_SIGN[side] * TOE_OUT_RAD))[0]
-        base = np.stack([foot.ahead_m, np.zeros_like(foot.ahead_m), foot.aside_m], axis=1)
-        return Foot(
-            position_m=base + foot.raised_m + rotate(yaw, ankle),
-            rotation=yaw @ heel_turn @ toe_turn @ euler_zxy(foot.tilt_rad),
-            share=foot.share,
-            cop_m=base[:, [0, 2]] + yaw[[0, 2], 0] * foot.cop_ahead_m[:, None],
-            on_plate=foot.on_plate,
         )
 
 

@@ -15,7 +15,7 @@ from bsip_cli.segments import without_side
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing
+from bsip_cli.simulate.landmarks import Marker, Swing, tissue_of
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
@@ -73,7 +73,11 @@ class Trial:
         feet = {side: (self.feet_force_n[side], self.feet_moment_nm[side]) for side in SIDES}
         if not apart:
             return feet
-        centres = {side: _centre_of_pressure(*feet[side]) for side in SIDES}
+        centres = {}
+        for side, (force, moment) in feet.items():  # on the floor; Y is up
+            load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
+            ahead, aside = moment[:, 2] / load, -moment[:, 0] / load
+            centres[side] = np.stack([ahead, np.zeros(len(load)), aside], axis=1)
         one, other = SIDES
         line = centres[other] - centres[one]
         line /= np.maximum(np.linalg.norm(line, axis=1), 1e-9)[:, None]
@@ -83,12 +87,6 @@ class Trial:
             force, moment = feet[side]
             feet[side] = (force + own, moment + np.cross(centres[side], own))
         return feet
-
-
-def _centre_of_pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-    """(T, 3) on the floor; Y is up."""
-    load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
-    return np.stack([moment[:, 2] / load, np.zeros(len(load)), -moment[:, 0] / load], axis=1)
 
 
 def simulate_trial(
@@ -119,12 +117,17 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
     keep = plan.keep
     wrench = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
     force, moment = (part[keep] for part in wrench)
-    planned, feet_force, feet_moment = plan.cop_m()[keep], {}, {}
+    planned, feet_force, feet_moment, contacts = plan.cop_m()[keep], {}, {}, []
     for side, foot in plan.feet.items():
         share, aside = foot.share[keep, None], foot.cop_m[keep] - planned
         lever = np.stack([aside[:, 0], np.zeros(len(aside)), aside[:, 1]], axis=1)
         feet_force[side] = share * force
         feet_moment[side] = share * moment + np.cross(lever, feet_force[side])
+        for part in runs(foot.share[keep] > 1e-9):  # the loaded intervals
+            start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
+            ahead, across = foot.cop_m[keep][part].mean(axis=0).tolist()
+            is_on = bool(foot.on_plate[keep][part].any())
+            contacts.append(Contact(side, start, end, is_on, (ahead, across)))
     return Trial(
         time_s=np.arange(keep.stop - keep.start) * STEP_S,
         poses=poses.part(keep),
@@ -133,21 +136,9 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
         feet_force_n=feet_force,
         feet_moment_nm=feet_moment,
         on_plate={side: foot.on_plate[keep] for side, foot in plan.feet.items()},
-        contacts=_contacts(plan),
+        contacts=tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side))),
         plan=plan,
     )
-
-
-def _contacts(plan: Plan) -> tuple[Contact, ...]:
-    """The loaded intervals of each foot within the recording, in order of time."""
-    contacts = []
-    for side, foot in plan.feet.items():
-        share, cop, on_plate = (a[plan.keep] for a in (foot.share, foot.cop_m, foot.on_plate))
-        for part in runs(share > 1e-9):
-            start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
-            ahead, aside = cop[part].mean(axis=0).tolist()
-            contacts.append(Contact(side, start, end, bool(on_plate[part].any()), (ahead, aside)))
-    return tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side)))
 
 
 # --- markers --------------------------------------------------------------------------------------
@@ -159,19 +150,6 @@ GAP_FRAMES = (5, 40)
 GAPS_PER_TRIAL = 1.5  # beyond the first one
 GAPS_PER_SECOND = 0.12
 LONGEST_GAP_SHARE = 0.15  # of a trial
-# The bones whose turning against a marker's bone moves the skin over it; * is the marker's side.
-NEIGHBOURS = {
-    "lower_torso": ("thigh_l", "thigh_r"),
-    "thorax": ("lower_torso", "head"),
-    "head": ("thorax", "thorax"),
-    "clavicle": ("thorax", "upper_arm*"),
-    "upper_arm": ("thorax", "forearm*"),
-    "forearm": ("upper_arm*", "hand*"),
-    "hand": ("forearm*", "forearm*"),
-    "thigh": ("lower_torso", "shank*"),
-    "shank": ("thigh*", "foot*"),
-    "foot": ("shank*", "shank*"),
-}
 MOVED_BY_THE_ARM = {"RAC": "upper_arm_r", "LAC": "upper_arm_l", "RSCAP": "upper_arm_r"}
 
 
@@ -191,7 +169,15 @@ def marker_paths(
         if richness.soft_tissue:
             segment = "upper_torso" if marker.body == "thorax" else marker.body
             late = _late(marker, person.tissue.get(segment), path, rate_hz)
-            path = path + _skin_travel(label, marker, poses) + late
+            # over its bone a marker travels as a smooth function of the nearby joints
+            own, side = poses.rotation[marker.body], marker.body[-2:]
+            tissue = tissue_of(without_side(marker.body))
+            first, second = (tissue[end].replace("*", side) for end in ("proximal", "distal"))
+            bodies = (first, MOVED_BY_THE_ARM.get(label, second))
+            turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
+            sines = np.concatenate(turns, axis=1)
+            travel = rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
+            path = path + travel + late
         white = richness.marker_noise_m * rng.standard_normal(path.shape)
         width = DRIFT_SMOOTHING_S * rate_hz
         slow = gaussian_filter1d(rng.standard_normal(path.shape), width, axis=0, mode="reflect")
@@ -199,16 +185,6 @@ def marker_paths(
         gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
         paths[label] = path + (white + richness.marker_drift_m * gain * slow)
     return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
-
-
-def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
-    """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
-    own, side = poses.rotation[marker.body], marker.body[-2:]
-    first, second = (name.replace("*", side) for name in NEIGHBOURS[without_side(marker.body)])
-    bodies = (first, MOVED_BY_THE_ARM.get(label, second))
-    turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
-    sines = np.concatenate(turns, axis=1)
-    return rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
 
 
 def _late(marker: Marker, swing: Swing | None, path: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -332,8 +308,14 @@ def plate_wrenches(
     wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
     feet = trial.feet_wrenches(apart)
     for contact in trial.contacts:
-        index = _plate_of(contact, plates, pose)
-        if index is None:
+        ahead, aside = contact.cop_m
+        place = pose.points(np.array([ahead, 0.0, aside]))
+        distances = [plate.distance_m(place) for plate in plates]
+        if contact.on_plate:
+            index = int(np.argmin(distances))
+        elif 0.0 in distances[1:]:  # a later step meets one by chance
+            index = distances.index(0.0, 1)
+        else:
             continue
         start, end = (round(s * SIMULATION_HZ) for s in (contact.start_s, contact.end_s))
         window = slice(start, end + 1)
@@ -341,16 +323,6 @@ def plate_wrenches(
         wrenches[index][0][window] += force
         wrenches[index][1][window] += moment
     return wrenches
-
-
-def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
-    """The plate under a contact; of a later step the one that it happens to meet."""
-    ahead, aside = contact.cop_m
-    place = pose.points(np.array([ahead, 0.0, aside]))
-    distances = [plate.distance_m(place) for plate in plates]
-    if contact.on_plate:
-        return int(np.argmin(distances))
-    return next((k for k, distance in enumerate(distances) if k and distance == 0.0), None)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -423,7 +395,20 @@ def write_trial(
     ):
         for name, value in zip(parameters, values, strict=True):
             c3d["parameters"][group][name]["value"] = value
-    _add_plates(c3d, plates)
+    count = len(plates)  # integers of the group are set by hand because ezc3d writes floats
+    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
+    force_platform = c3d["parameters"]["FORCE_PLATFORM"]
+    for name, value in {
+        "USED": np.array([count]),
+        "TYPE": np.full(count, 2),
+        "ZERO": np.array([1, 0]),
+        "CHANNEL": np.arange(1, 6 * count + 1).reshape(count, 6).T,
+        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
+        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
+    }.items():
+        if name not in force_platform:
+            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
+        force_platform[name]["value"] = value
     c3d.add_parameter("SUBJECTS", "NAMES", [subject])
     c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])
     c3d["parameters"]["SUBJECTS"]["USES_PREFIXES"]["value"] = np.array([0])
@@ -442,22 +427,3 @@ def write_trial(
         channels = np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
     data["analogs"] = channels.T[None]
     c3d.write(str(path))
-
-
-def _add_plates(c3d: ezc3d.c3d, plates: Sequence[Plate]) -> None:
-    """The FORCE_PLATFORM group; integers are set by hand because ezc3d writes floats."""
-    n = len(plates)
-    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
-    group = {
-        "USED": np.array([n]),
-        "TYPE": np.full(n, 2),
-        "ZERO": np.array([1, 0]),
-        "CHANNEL": np.arange(1, 6 * n + 1).reshape(n, 6).T,
-        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
-        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
-    }
-    parameters = c3d["parameters"]["FORCE_PLATFORM"]
-    for name, value in group.items():
-        if name not in parameters:
-            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
-        parameters[name]["value"] = value

@@ -286,7 +286,16 @@ def inject_command(
     if not source.is_dir():
         if participants or effect_tasks:
             raise UsageError("one recording has no participants or tasks to choose from")
-        return _inject_one(source, out, options)
+        copy = out if out.suffix.lower() == source.suffix.lower() else out / source.name
+        if os.path.lexists(copy):
+            raise UsageError("the file is there already", file=copy, remedy="name a new one")
+        hidden = effects_of(options, 1)
+        with _writing(copy):
+            facts = inject_recording(source, copy, hidden)
+            record = {"effects": [effect.record() for effect in hidden], **facts}
+            write_truth(copy.with_name(f"{copy.stem}_injected.json"), record)
+        click.echo(f"bsip inject: {printable(str(copy))}", err=True)
+        return 0
     if lies_in(out, source):
         raise UsageError(
             "lies in what is to be copied", file=out, remedy="name a folder outside the study"
@@ -298,20 +307,6 @@ def inject_command(
         click.echo(f"bsip inject: {error}", err=True)
     click.echo(f"bsip inject: {len(changed)} recordings changed in {printable(str(out))}", err=True)
     return BadDataError.exit_code if refused or not changed else 0
-
-
-def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
-    """One recording; OUT is the new file, or a folder for it."""
-    copy = out if out.suffix.lower() == source.suffix.lower() else out / source.name
-    if os.path.lexists(copy):
-        raise UsageError("the file is there already", file=copy, remedy="name a new one")
-    hidden = effects_of(options, 1)
-    with _writing(copy):
-        facts = inject_recording(source, copy, hidden)
-        record = {"effects": [effect.record() for effect in hidden], **facts}
-        write_truth(copy.with_name(f"{copy.stem}_injected.json"), record)
-    click.echo(f"bsip inject: {printable(str(copy))}", err=True)
-    return 0
 
 
 def _check_new(folder: Path) -> None:

@@ -74,10 +74,9 @@ def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
     there, back = np.array([0.03, 0.0, 0.0]), np.array([-0.03, 0.0, 0.0])
     times = ((START, there), (STOP, np.array([0.0, 0.03, 0.0])), (STOP, back))
     slips = [marker_evidence._Slip(0, frame, vector, 9.0) for frame, vector in times]
-    strongest = SimpleNamespace(change=SimpleNamespace(z=9.0))
     search = SimpleNamespace(
         left=None,
-        changes=lambda: [strongest] * len(slips),
+        changes=lambda: {0: SimpleNamespace(z=9.0)} if slips else {},
         source=lambda *_: (slips.pop(0), None),
         take=lambda *_: None,
     )

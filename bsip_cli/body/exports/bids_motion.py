@@ -9,22 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.exports.identified import export_words
 from bsip_cli.body.exports.opensim_motion import coordinates
 from bsip_cli.body.skeleton import Skeleton
 
 TRACKSYS = "bsip"
-_FRAMES = {
-    "global": {
-        "SpatialAxes": "__S",
-        "RotationRule": "right-hand",
-        "Description": "Z up; X and Y of the laboratory",
-    },
-    "joint": {
-        "RotationRule": "right-hand",
-        "Description": "of the distal segment in the proximal one: z about Z (to the right) of the "
-        "proximal one, then x (anterior), then y along the distal one; hinges about their own axis",
-    },
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +39,18 @@ def channels(
 ) -> list[Channel]:
     """Markers (N, m, 3), pose q (N, nq) in the frames that determine it, and ground wrenches (N, 6)
     on the body about the world's origin, by plate; world frame, SI, angles in degrees."""
-    return [
-        *_markers(markers, markers_m),
-        *_pose(skeleton, q, determined),
-        *(one for name, wrench in plates.items() for one in _plate(name, wrench)),
-    ]
-
-
-def _markers(names: Sequence[str], places_m: np.ndarray) -> Iterator[Channel]:
-    for k, name in enumerate(names):
-        for c, axis in enumerate("xyz"):
-            values = places_m[:, k, c]
-            yield Channel(f"{name}_{axis}", axis, "POS", name, "m", "global", values)
+    places = (
+        Channel(f"{name}_{axis}", axis, "POS", name, "m", "global", markers_m[:, k, c])
+        for k, name in enumerate(markers)
+        for c, axis in enumerate("xyz")
+    )
+    components = [("f", axis, "N") for axis in "xyz"] + [("m", axis, "N m") for axis in "xyz"]
+    forces = (
+        Channel(f"plate{name}_{what}{axis}", axis, "MISC", f"plate{name}", unit, "global", values)
+        for name, wrench in plates.items()
+        for (what, axis, unit), values in zip(components, wrench.T, strict=True)
+    )
+    return [*places, *_pose(skeleton, q, determined), *forces]
 
 
 def _pose(skeleton: Skeleton, q: np.ndarray, determined: np.ndarray) -> Iterator[Channel]:
@@ -85,13 +74,6 @@ def _pose(skeleton: Skeleton, q: np.ndarray, determined: np.ndarray) -> Iterator
         yield Channel(name, axis, "JNTANG", joint, "deg", "joint", values)
 
 
-def _plate(name: str, wrench: np.ndarray) -> Iterator[Channel]:
-    point = f"plate{name}"
-    for (what, unit), values in zip((("f", "N"), ("m", "N m")), np.hsplit(wrench, 2), strict=True):
-        for axis, one in zip("xyz", values.T, strict=True):
-            yield Channel(f"{point}_{what}{axis}", axis, "MISC", point, unit, "global", one)
-
-
 def motion_tsv(columns: Sequence[Channel]) -> str:
     """Values, a row per frame, without a header."""
     rows = np.column_stack([one.values for one in columns])
@@ -108,7 +90,7 @@ def channels_tsv(columns: Sequence[Channel]) -> str:
 
 def channels_json() -> str:
     """What the reference frames are."""
-    return _json({"reference_frame": {"Levels": _FRAMES}})
+    return _json({"reference_frame": {"Levels": export_words()["bids_reference_frames"]}})
 
 
 def motion_json(columns: Sequence[Channel], task: str, rate_hz: float, version: str) -> str:

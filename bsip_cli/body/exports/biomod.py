@@ -9,17 +9,11 @@ import numpy as np
 from bsip_cli.body.exports.identified import BALL_AXES, IdentifiedPerson, numbers
 from bsip_cli.body.gravity import GRAVITY_M_S2
 
-_NOTES = (
-    "SI units, Z up. Segment frames: origin at the joint to the parent, axes of the segment (X",
-    "anterior, Y up, Z right); the inertia is about the centre of mass. 'base' only translates,",
-    "a segment called like a joint only turns about its hinge.",
-)
-
 
 def biomod_text(body: IdentifiedPerson) -> str:
     """A bioMod file, version 4; errors as of `check_bodies` and `markers`."""
     body.check_bodies()
-    lines = ["version 4", *(f"// {line}" for line in (*body.made_of, *_NOTES)), ""]
+    lines = ["version 4", *(f"// {line}" for line in body.said("biomod")), ""]
     lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
     lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
     for i in range(len(body.person.skeleton.segments)):
@@ -37,26 +31,27 @@ def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
     skeleton = person.skeleton
     kind, segment = skeleton.joint_types[i], skeleton.segments[i]
     parent = skeleton.segments[skeleton.parents[i]] if i else "base"
-    position, rotations = person.joint_positions_m()[i], BALL_AXES
-    tilt = np.pi / 2 if kind == "free" else 0.0
+    position = person.joint_positions_m()[i]
+    parts = [(segment, parent, np.pi / 2 if kind == "free" else 0.0, position, BALL_AXES)]
     if kind == "revolute":
         hinge = skeleton.joints[i]
-        yield f"segment {hinge}"
-        yield f"    parent {parent}"
-        yield f"    RT {numbers([person.parent_tilt_rad[i], 0, 0])} xyz {numbers(position)}"
-        yield "    rotations z"
-        yield "    mass 0"
+        parts = [
+            (hinge, parent, person.parent_tilt_rad[i], position, "z"),
+            (segment, hinge, -person.child_tilt_rad[i], np.zeros(3), ""),
+        ]
+    for name, above, tilt, place, rotations in parts:
+        yield f"segment {name}"
+        yield f"    parent {above}"
+        yield f"    RT {numbers([tilt, 0, 0])} xyz {numbers(place)}"
+        if rotations:
+            yield f"    rotations {rotations}"
+        if name == segment:
+            inertia = body.in_joint(i)
+            yield f"    mass {numbers([inertia.mass_kg])}"
+            yield "    inertia"
+            for row in inertia.tensor_kgm2:
+                yield f"        {numbers(row)}"
+            yield f"    com {numbers(inertia.com_m)}"
+        else:
+            yield "    mass 0"
         yield "endsegment"
-        parent, position, tilt, rotations = hinge, np.zeros(3), -person.child_tilt_rad[i], ""
-    yield f"segment {segment}"
-    yield f"    parent {parent}"
-    yield f"    RT {numbers([tilt, 0, 0])} xyz {numbers(position)}"
-    if rotations:
-        yield f"    rotations {rotations}"
-    inertia = body.in_joint(i)
-    yield f"    mass {numbers([inertia.mass_kg])}"
-    yield "    inertia"
-    for row in inertia.tensor_kgm2:
-        yield f"        {numbers(row)}"
-    yield f"    com {numbers(inertia.com_m)}"
-    yield "endsegment"

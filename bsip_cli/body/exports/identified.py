@@ -6,16 +6,25 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
 from bsip_cli.body.person import Person
+from bsip_cli.config import shipped
 from bsip_cli.errors import BadDataError
+from bsip_cli.files.regular import read_toml
 
 # Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
 # (ISB); the two other axes coincide only with the middle angle at 90 degrees.
 BALL_AXES = "zxy"
+
+
+@cache
+def export_words() -> dict:
+    """Of configs/exports.toml."""
+    return read_toml(shipped("exports.toml"))
 
 
 @dataclass(frozen=True)
@@ -39,6 +48,10 @@ class IdentifiedPerson:
     @property
     def mass_kg(self) -> float:
         return sum(inertia.mass_kg for inertia in self.inertias)
+
+    def said(self, kind: str) -> tuple[str, ...]:
+        """The lines that a file of this format begins with."""
+        return (*self.made_of, *export_words()["notes"][kind])
 
     def in_joint(self, i: int) -> Inertia:
         """Inertia of segment ``i`` seen from its joint centre, segment axes; zeros without mass."""

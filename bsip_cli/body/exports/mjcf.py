@@ -10,12 +10,6 @@ from bsip_cli.body.exports.identified import IdentifiedPerson, numbers, xml_comm
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
-_NOTES = (
-    "SI units, Z up. Body frames: origin at the joint to the parent, axes of the segment (X",
-    "anterior, Y up, Z right); at qpos0 the person stands upright, facing along X. Sites are the",
-    "markers. There are no geoms, no limits and no actuators. MuJoCo moves no body without mass:",
-    "massless rods (clavicles), where the skeleton has them, weigh a milligram.",
-)
 _ROD = Inertia(1e-6, np.zeros(3), 1e-9 * np.eye(3))
 
 
@@ -24,7 +18,7 @@ def mjcf_text(body: IdentifiedPerson) -> str:
     `markers`."""
     body.check_bodies()
     root = ET.Element("mujoco", model=body.name)
-    root.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    root.append(ET.Comment(xml_comment(body.said("mjcf"))))
     ET.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
     ET.SubElement(root, "option", gravity=numbers([0.0, 0.0, -GRAVITY_M_S2]))
     world = ET.SubElement(root, "worldbody")

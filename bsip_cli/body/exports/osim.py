@@ -41,11 +41,8 @@ COORDINATES = {
 }
 """Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
 (flexion), X after that turn, and Y of the segment."""
+_KINDS = ("Body", "Joint", "Marker")
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-_NOTES = (
-    "SI units, Y up. Body frames: origin at the joint to the parent, axes of the segment (X",
-    "anterior, Y up, Z right). No muscles, no geometry, no limits.",
-)
 
 
 def osim_text(body: IdentifiedPerson) -> str:
@@ -53,12 +50,11 @@ def osim_text(body: IdentifiedPerson) -> str:
     `markers`."""
     body.check_bodies()
     document = ET.Element("OpenSimDocument", Version="40000")
-    document.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    document.append(ET.Comment(xml_comment(body.said("osim"))))
     model = ET.SubElement(document, "Model", name=body.name)
     ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
-    bodies = _set_of(model, "BodySet", "bodyset")
-    joints = _set_of(model, "JointSet", "jointset")
-    markers = _set_of(model, "MarkerSet", "markerset")
+    sets = (ET.SubElement(model, f"{kind}Set", name=f"{kind}set".lower()) for kind in _KINDS)
+    bodies, joints, markers = (ET.SubElement(one, "objects") for one in sets)
     for i, name in enumerate(body.person.skeleton.segments):
         set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
         _add_joint(joints, body, i)
@@ -83,10 +79,6 @@ def add_texts(element: ET.Element, texts: Mapping[str, str]) -> None:
     """An element with a text below another, for each tag."""
     for tag, text in texts.items():
         ET.SubElement(element, tag).text = text
-
-
-def _set_of(model: ET.Element, tag: str, name: str) -> ET.Element:
-    return ET.SubElement(ET.SubElement(model, tag, name=name), "objects")
 
 
 def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
@@ -215,13 +207,21 @@ def check_fits(model: GivenModel, body_map: BodyMap) -> None:
             )
     for group in body_map.groups:
         placed = _placements(model, group)
-        for segment, body in group.joints:
-            if not {body, model.joints[body].parent} & set(placed):
-                raise _bad_group(model, group, f"{body} ({segment}) is no joint of these bodies")
+        faults = [
+            f"{body} ({segment}) is no joint of these bodies"
+            for segment, body in group.joints
+            if not {body, model.joints[body].parent} & set(placed)
+        ]
         if set(placed) != set(group.bodies):
-            raise _bad_group(model, group, "its bodies are not joined to each other")
+            faults.append("its bodies are not joined to each other")
         if sum(model.masses_kg[body] for body in group.bodies) <= 0:
-            raise _bad_group(model, group, "its bodies have no mass to share by")
+            faults.append("its bodies have no mass to share by")
+        if faults:
+            raise UsageError(
+                f"group {', '.join(group.bodies)}: {faults[0]}",
+                file=model.file,
+                remedy="correct the map of bodies",
+            )
 
 
 def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson) -> Replacement:
@@ -231,9 +231,14 @@ def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson
     changed: dict[str, Inertia] = {}
     misfit: dict[str, float] = {}
     for group in body_map.groups:
-        shift, misfit[group.bodies[0]] = _fit(model, group, person)
-        whole = pin.SE3(np.eye(3), shift).act(_segments_as_one(person, group.segments))
-        changed |= _shared(model, group, whole)
+        placed = _placements(model, group)
+        whole, misfit[group.bodies[0]] = _united(model, group, placed, person)
+        total = sum(model.masses_kg[body] for body in group.bodies)
+        for body, place in placed.items():  # all parts have the whole's shape, so are it together
+            part = model.masses_kg[body] / total
+            own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
+            seen = place.actInv(own)
+            changed[body] = Inertia(seen.mass, np.array(seen.lever), np.array(seen.inertia))
     document = deepcopy(model.document)
     for element in document.iterfind(_BODIES):
         if element.attrib["name"] in changed:
@@ -257,31 +262,30 @@ def _sentence(misfit_m: dict[str, float], untouched: dict[str, float]) -> str:
     )
 
 
-def _fit(model: GivenModel, group: BodyGroup, person: IdentifiedPerson) -> tuple[np.ndarray, float]:
-    """Where the first segment's joint lies in the group's frame (3,), and the misfit [m]."""
+def _united(
+    model: GivenModel, group: BodyGroup, placed: dict[str, pin.SE3], person: IdentifiedPerson
+) -> tuple[pin.Inertia, float]:
+    """The segments as one in the neutral pose, in the group's frame, and the misfit [m]."""
     skeleton = person.person.skeleton
     rotations, joints = neutral_pose(person.person)
-    first = skeleton.index(group.segments[0])
-    placed, theirs = _placements(model, group), []
+    at = [skeleton.index(name) for name in group.segments]
+    turn, joint_m = rotations[at[0]], joints[at[0]]
+    whole = pin.Inertia.Zero()
+    for i in at:
+        own = person.in_joint(i)
+        part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
+        whole += pin.SE3(turn, joint_m).actInv(pin.SE3(rotations[i], joints[i])).act(part)
+    theirs = []
     for _, body in group.joints:  # centre of the joint that carries it
-        joint, own = model.joints[body], body in placed
-        there = placed[body] * joint.in_child if own else placed[joint.parent] * joint.in_parent
+        joint = model.joints[body]
+        inside = body in placed
+        there = placed[body] * joint.in_child if inside else placed[joint.parent] * joint.in_parent
         theirs.append(there.translation)
-    ways = [joints[skeleton.index(segment)] - joints[first] for segment, _ in group.joints]
-    shifts = np.array(theirs) - np.array([rotations[first].T @ way for way in ways])
+    ways = [joints[skeleton.index(segment)] - joint_m for segment, _ in group.joints]
+    shifts = np.array(theirs) - np.array([turn.T @ way for way in ways])
     shift = shifts.mean(axis=0)
-    return shift, float(np.linalg.norm(shifts - shift, axis=1).max())
-
-
-def _shared(model: GivenModel, group: BodyGroup, whole: pin.Inertia) -> dict[str, Inertia]:
-    """Each body's part of the whole: all parts have its shape, so together they are it."""
-    total = sum(model.masses_kg[body] for body in group.bodies)
-    parts = {}
-    for body, place in _placements(model, group).items():
-        part = model.masses_kg[body] / total
-        own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
-        parts[body] = _read(place.actInv(own))
-    return parts
+    misfit_m = float(np.linalg.norm(shifts - shift, axis=1).max())
+    return pin.SE3(np.eye(3), shift).act(whole), misfit_m
 
 
 def _placements(model: GivenModel, group: BodyGroup) -> dict[str, pin.SE3]:
@@ -298,14 +302,6 @@ def _placements(model: GivenModel, group: BodyGroup) -> dict[str, pin.SE3]:
             elif joint.child in placed:
                 placed[joint.parent] = placed[joint.child] * across.inverse()
     return placed
-
-
-def _bad_group(model: GivenModel, group: BodyGroup, found: str) -> UsageError:
-    return UsageError(
-        f"group {', '.join(group.bodies)}: {found}",
-        file=model.file,
-        remedy="correct the map of bodies",
-    )
 
 
 def _joint(element: ET.Element) -> GivenJoint:
@@ -344,23 +340,6 @@ def _number(text: str) -> float:
     if not np.isfinite(value):
         raise ValueError(f"{text!r} instead of a number")
     return value
-
-
-def _segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> pin.Inertia:
-    """Segments united in the neutral pose, in the frame of the first one's joint."""
-    rotations, joints = neutral_pose(body.person)
-    at = [body.person.skeleton.index(name) for name in segments]
-    first = pin.SE3(rotations[at[0]], joints[at[0]])
-    whole = pin.Inertia.Zero()
-    for i in at:
-        own = body.in_joint(i)
-        part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
-        whole += first.actInv(pin.SE3(rotations[i], joints[i])).act(part)
-    return whole
-
-
-def _read(inertia: pin.Inertia) -> Inertia:
-    return Inertia(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))
 
 
 # --- which bodies of a model are which segments, as data (configs/opensim) ------------------------
@@ -421,8 +400,7 @@ def shipped_names() -> tuple[str, ...]:
 def fitting_map(bodies: Iterable[str]) -> BodyMap | None:
     """The shipped map that fits a model with these bodies and explains most of them."""
     known = set(bodies)
-    maps = [load_body_map(name) for name in shipped_names()]
-    fitting = [each for each in maps if each.bodies() <= known]
+    fitting = (each for each in map(load_body_map, shipped_names()) if each.bodies() <= known)
     return max(fitting, key=lambda each: len(each.bodies()), default=None)
 
 

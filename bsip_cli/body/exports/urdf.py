@@ -19,19 +19,13 @@ from bsip_cli.body.inertia import Inertia
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # Turns the segments' axes (X anterior, Y up, Z right) upright in a world with Z up.
 _UPRIGHT = (np.pi / 2, 0.0, 0.0)
-_NOTES = (
-    "SI units. Link frames: origin at the joint to the parent, axes of the segment (X anterior,",
-    "Y up, Z right). The root link 'base' has Z up, X anterior, Y left, and floats (free base).",
-    "URDF knows no ball joint: three continuous joints in a row, about Z, X and Y, with massless",
-    "links between them.",
-)
 
 
 def urdf_text(body: IdentifiedPerson) -> str:
     """A URDF robot; the reader adds the free base. Errors as of `check_bodies`."""
     body.check_bodies()
     robot = ET.Element("robot", name=body.name)
-    robot.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    robot.append(ET.Comment(xml_comment(body.said("urdf"))))
     _add_link(robot, "base")
     for i, segment in enumerate(body.person.skeleton.segments):
         _add_joints(robot, body, i)

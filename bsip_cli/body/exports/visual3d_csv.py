@@ -23,20 +23,11 @@ _UPRIGHT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 # The foot lies: its axial direction points back to the ankle.
 _LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
-_NOTES = (
-    "Axes after Visual3D: z axial, x to the right. From bsip's X anterior, Y up, Z right: x = Z,",
-    "y = X, z = Y; of the foot x = Z, y = Y, z = -X. The CG is seen from the segment's origin (its",
-    "proximal joint; of the trunk and the head the cervical joint centre, of the pelvis the lumbar",
-    "one). cg_axial_m runs along the segment's length (head: up; foot: forward; others: down),",
-    "cg_axial_fraction is its part of length_m. Moments of inertia are about the CG; ixy, ixz and",
-    "iyz are entries of the tensor.",
-)
-
 
 def visual3d_csv_text(body: IdentifiedPerson) -> str:
     """One row per segment with mass; lines that begin with ``#`` say what made it, and its axes."""
     text = io.StringIO()
-    for line in (*body.made_of, *_NOTES):
+    for line in body.said("csv"):
         text.write(f"# {line}\n")
     rows = [
         _row(body, *one) for one in zip(body.person.skeleton.bodies, body.inertias, strict=True)
@@ -48,7 +39,6 @@ def visual3d_csv_text(body: IdentifiedPerson) -> str:
 
 
 def _row(body: IdentifiedPerson, i: int, inertia: Inertia) -> dict[str, Any]:
-    """Column to value of segment ``i``."""
     skeleton, length = body.person.skeleton, body.person.lengths_m[i]
     lies = skeleton.table_rows[i] == "foot"
     turn = _LYING if lies else _UPRIGHT

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.effects import instruments, loads  # noqa: F401
-from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
+from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, OnSegment, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
 EFFECTS = {name: KINDS[name] for name in TABLE}
@@ -41,8 +42,8 @@ def pair_up(
     asked = tuple(map(Asked, names, sizes, targets or [""] * len(names)))
     for one in asked:
         effect = drawn(one, np.random.default_rng(0))
-        if simulated:
-            effect.check_simulated()
+        if simulated and isinstance(effect, OnSegment) and effect.segment not in SEGMENTS:
+            raise effect.wrong_target(effect.segment)  # only measured data can have it
     return asked
 
 
@@ -54,17 +55,7 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
             f"{asked.name} of size {asked.size:g}",
             expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
         )
-    target = _parsed(asked)
-    nowhere = kind.targets == NOWHERE
-    if target.name and (nowhere or target.name not in (kind.choices or [target.name])):
-        raise kind.wrong_target(target.name)
-    return kind.draw(asked.size, target, rng)
-
-
-def _parsed(asked: Asked) -> Target:
-    """Split ``NAME,key=number,...`` and check the keys."""
-    kind, name = EFFECTS[asked.name], ""
-    settings: dict[str, float] = {}
+    name, settings = "", dict[str, float]()
     for part in asked.target.split(",") if asked.target not in NO_TARGET else []:
         key, equals, number = part.partition("=")
         if not equals and not name and not settings:
@@ -76,17 +67,16 @@ def _parsed(asked: Asked) -> Target:
             raise kind.wrong_target(asked.target) from error
         if key not in kind.settings:
             raise kind.wrong_target(asked.target)
-    return Target(name, settings)
+    if name and (kind.targets == NOWHERE or name not in (kind.choices or [name])):
+        raise kind.wrong_target(name)
+    return kind.draw(asked.size, Target(name, settings), rng)
 
 
 def effects_of(options: StudyOptions, number: int) -> tuple[Effect, ...]:
     """The effects of a participant; those of the lab are the same for all."""
-    effects = []
-    for index, one in enumerate(options.effects):
-        owner = number if EFFECTS[one.name].personal else 0
-        rng = np.random.default_rng([options.seed, owner, EFFECT, index])
-        effects.append(drawn(one, rng))
-    return tuple(effects)
+    owners = (number if EFFECTS[one.name].personal else 0 for one in options.effects)
+    seeds = ([options.seed, owner, EFFECT, index] for index, owner in enumerate(owners))
+    return tuple(map(drawn, options.effects, map(np.random.default_rng, seeds)))
 
 
 def touches(effect: Effect, task: str, tasks: tuple[str, ...]) -> bool:

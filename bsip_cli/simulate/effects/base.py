@@ -7,9 +7,7 @@ the same in every trial that it touches.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import asdict, dataclass, field, replace
-from importlib.resources import files
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -17,6 +15,7 @@ import numpy as np
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.segments import SEGMENTS
+from bsip_cli.simulate.landmarks import table
 from bsip_cli.simulate.people import Inertia, Person, combined
 from bsip_cli.simulate.plan import Plan
 
@@ -24,8 +23,7 @@ NOWHERE = "none"  # what the target of an effect without a place may be
 JOINTS = tuple(
     f"{joint}_{side}" for joint in ("hip", "shoulder", "knee", "ankle", "elbow") for side in "lr"
 )
-_FILE = files("bsip_cli.simulate.effects").joinpath("effects.csv")
-TABLE = {row["name"]: row for row in csv.DictReader(_FILE.read_text("utf-8").splitlines())}
+TABLE = {row["name"]: row for row in table("effects/effects.csv")}
 KINDS: dict[str, type[Effect]] = {}
 """The classes by name, as far as they are imported."""
 
@@ -85,8 +83,7 @@ class Effect:
         cls.choices = row["choices"].format(**{k: " ".join(x) for k, x in every.items()}).split()
         cls.settings, cls.needs = row["settings"].split(), row["needs"].split()
         cls.spares_static, cls.injectable = (
-            row["spares_static"] == "yes",
-            row["injectable"] == "yes",
+            row[k] == "yes" for k in ("spares_static", "injectable")
         )
         cls.personal = row["drawn_for"] == "person"
 
@@ -98,9 +95,6 @@ class Effect:
     @classmethod
     def wrong_target(cls, name: str) -> UsageError:
         return UsageError(f"{cls.name} cannot have the target {name!r}", expected=cls.targets)
-
-    def check_simulated(self) -> None:
-        """Refuse what only measured data can have."""
 
     def person(self, person: Person) -> Person:
         """The person as she or he really is, in all trials."""
@@ -144,10 +138,6 @@ class OnSegment(Effect):
     """An effect at a segment, by default at its centre of mass."""
 
     segment: str
-
-    def check_simulated(self) -> None:
-        if self.segment not in SEGMENTS:
-            raise self.wrong_target(self.segment)
 
     def position_m(self, person: Person) -> np.ndarray:
         """(3,) in the segment's frame."""

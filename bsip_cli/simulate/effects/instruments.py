@@ -260,7 +260,14 @@ class OnSkin(Effect):
         column = instruments.column(self.marker or drawn)
         way = self.size * self.moved(instruments.frame_times_s())
         points = instruments.points_m.copy()
-        points[:, column] += way[:, None] * rotate(companion_frame(points, column), self.along)
+        distance = np.linalg.norm(points - points[:, [column]], axis=2)
+        seen = np.isfinite(distance).mean(axis=0)
+        spread = np.nanstd(np.where(seen > 0.5, distance, 0.0), axis=0)
+        spread = np.where(seen > 0.5, spread, np.inf)
+        spread[column] = np.inf
+        a, b, c = points[:, np.argsort(spread, kind="stable")[:COMPANIONS]].transpose(1, 0, 2)
+        # NaN where a companion is lost: then that frame of the marker is lost too
+        points[:, column] += way[:, None] * rotate(frame_of(b - a, c - a), self.along)
         return replace(instruments, points_m=points)
 
     @abstractmethod
@@ -308,20 +315,6 @@ class MarkerSlide(OnSkin, name="marker_slide"):
         return glide(times_s, start, end, SOFT * (end - start))
 
 
-def companion_frame(points_m: np.ndarray, column: int) -> np.ndarray:
-    """(F, 3, 3) axes of the markers that keep their distance to a marker best.
-
-    NaN where one of them is lost: then that frame of the marker is lost too.
-    """
-    distance = np.linalg.norm(points_m - points_m[:, [column]], axis=2)
-    seen = np.isfinite(distance).mean(axis=0)
-    spread = np.nanstd(np.where(seen > 0.5, distance, 0.0), axis=0)
-    spread = np.where(seen > 0.5, spread, np.inf)
-    spread[column] = np.inf
-    a, b, c = points_m[:, np.argsort(spread, kind="stable")[:COMPANIONS]].transpose(1, 0, 2)
-    return frame_of(b - a, c - a)
-
-
 @dataclass(frozen=True, eq=False)
 class MarkerSwap(Effect, name="marker_swap"):
     """Two markers carry each other's label for `size` seconds.
@@ -344,19 +337,15 @@ class MarkerSwap(Effect, name="marker_swap"):
         number, share = int(rng.integers(CLOSE_PAIRS)), float(rng.uniform(0.2, 0.8))
         return cls(size, first, second, number, share, target.settings.get("start_s"))
 
-    def _pair(self, instruments: Instruments) -> tuple[int, int]:
-        """The columns of the two markers."""
-        if self.first:
-            return instruments.column(self.first), instruments.column(self.second)
-        points = np.nanmedian(instruments.points_m, axis=0)
-        distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-        distance[np.tril_indices(len(points))] = np.inf
-        flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
-        a, b = np.unravel_index(flat, distance.shape)
-        return int(a), int(b)
-
     def measured(self, instruments: Instruments) -> Instruments:
-        a, b = self._pair(instruments)
+        if self.first:
+            a, b = instruments.column(self.first), instruments.column(self.second)
+        else:
+            points = np.nanmedian(instruments.points_m, axis=0)
+            distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+            distance[np.tril_indices(len(points))] = np.inf
+            flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
+            a, b = map(int, np.unravel_index(flat, distance.shape))
         times = instruments.frame_times_s()
         free = max(times[-1] - self.size, 0.0)
         start = self.start_share * free if self.start_s is None else self.start_s

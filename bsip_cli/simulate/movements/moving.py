@@ -28,15 +28,20 @@ STEPS = range(-8, 8)  # planned before and after the one on the plate
 
 
 @dataclass(frozen=True)
-class Style:
-    """What all gaits of a kind share.
+class Gait:
+    """A steady gait. Step 0 starts at 0 s (its foot touches down) and lies on the plate.
 
+    step_s : from one touch-down to the next. stance_s : contact of one foot.
     rise_s, fall_s : in which a swinging foot gains and loses its speed.
     toe_roll_rad, heel_roll_rad : largest heel rise, and toe rise at touch-down.
     toe_roll_share : part of the stance after which the heel rises.
     cop_from, cop_to : centre of pressure ahead of the ankle, in lengths of the foot.
     """
 
+    speed_m_s: float
+    step_s: float
+    stance_s: float
+    first_side: str
     half_width_m: float
     rise_s: float
     fall_s: float
@@ -49,40 +54,23 @@ class Style:
     arm_swing_rad: float
     elbow_rad: float
 
-
-@dataclass(frozen=True)
-class Gait(Style):
-    """A steady gait. Step 0 starts at 0 s (its foot touches down) and lies on the plate.
-
-    step_s : from one touch-down to the next. stance_s : contact of one foot.
-    """
-
-    speed_m_s: float
-    step_s: float
-    stance_s: float
-    first_side: str
-
     def side_of(self, k: int) -> str:
         """The foot of step k."""
         return self.first_side if k % 2 == 0 else other_side(self.first_side)
 
 
+# What all gaits of a kind share: the fields of `Gait` from half_width_m on.
 _rad = np.deg2rad
-WALKING = Style(0.05, 0.24, 0.10, 0.04, _rad(58), _rad(24), 0.50, -0.20, 0.68, _rad(22), _rad(10))
-RUNNING = Style(0.035, 0.13, 0.05, 0.14, _rad(75), _rad(20), 0.45, 0.10, 0.68, _rad(28), _rad(75))
+WALKING = (0.05, 0.24, 0.10, 0.04, _rad(58), _rad(24), 0.50, -0.20, 0.68, _rad(22), _rad(10))
+RUNNING = (0.035, 0.13, 0.05, 0.14, _rad(75), _rad(20), 0.45, 0.10, 0.68, _rad(28), _rad(75))
 
 
 def walking(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
     """A part of walking around one stance on the plate."""
     size = person.stature_m / 1.7
     step_s = rng.uniform(0.50, 0.53)
-    gait = Gait(
-        **vars(WALKING),
-        speed_m_s=rng.uniform(1.18, 1.28) * size,
-        step_s=step_s,
-        stance_s=1.14 * step_s,
-        first_side=str(rng.choice(SIDES)),
-    )
+    speed, first_side = rng.uniform(1.18, 1.28) * size, str(rng.choice(SIDES))
+    gait = Gait(speed, step_s, 1.14 * step_s, first_side, *WALKING)
     sketch = _sketch(person, gait, duration_s)
     t, double = sketch.t_s, gait.stance_s - step_s
     sketch.pelvis_m[:, 1] -= 0.016 * size * np.cos(2.0 * np.pi * (t - 0.5 * double) / step_s)
@@ -97,25 +85,31 @@ def running(person: Person, rng: np.random.Generator, duration_s: float, _ball: 
     """A part of running around one stance on the plate, with flight before and after."""
     size = person.stature_m / 1.7
     step_s = round(rng.uniform(0.335, 0.35), 3)
-    gait = Gait(
-        **vars(RUNNING),
-        speed_m_s=rng.uniform(2.7, 2.9) * size,
-        step_s=step_s,
-        stance_s=round(0.70 * step_s, 3),
-        first_side=str(rng.choice(SIDES)),
-    )
+    stance_s = round(0.70 * step_s, 3)
+    speed, first_side = rng.uniform(2.7, 2.9) * size, str(rng.choice(SIDES))
+    gait = Gait(speed, step_s, stance_s, first_side, *RUNNING)
     sketch = _sketch(person, gait, duration_s)
     t, flights = sketch.t_s, []
     for k in STEPS:
-        touch, lift = k * step_s, k * step_s + gait.stance_s
+        touch, lift = k * step_s, k * step_s + stance_s
         stance = (t > touch - 0.5 * STEP_S) & (t < lift + 0.5 * STEP_S)
         sketch.feet[gait.side_of(k)].share[stance] = 1.0
         first, last = sketch.sample_of(lift), sketch.sample_of((k + 1) * step_s)
         if first > 0 and last < len(t) - 1:
             flights.append((first, last))
     sketch.angles["waist"][:, 0] -= np.deg2rad(8.0)
-    height = _bouncing_height(sketch, gait)
+    # height of the centre of mass for ground forces 30 s^2 (1-s)^2 over each stance
+    time = np.mod(t + 1e-9, step_s) - 1e-9
+    s, after = np.clip(time / stance_s, 0.0, 1.0), time - np.minimum(time, stance_s)
+    height = G * step_s * stance_s * _hump_twice(s) + G * step_s * after
+    height += -0.5 * G * (step_s - stance_s) * time - 0.5 * G * time**2
+    height = 0.56 * person.stature_m + height
     return _finished(sketch, gait, rng, flights=tuple(flights), com_height_m=height)
+
+
+def _hump_twice(s: np.ndarray) -> np.ndarray:
+    """Double integral of a force 30 s^2 (1-s)^2."""
+    return 2.5 * s**4 - 3.0 * s**5 + s**6
 
 
 def _sketch(person: Person, gait: Gait, duration_s: float) -> Sketch:
@@ -127,12 +121,21 @@ def _sketch(person: Person, gait: Gait, duration_s: float) -> Sketch:
     sketch = Sketch(person, t, (start, start + duration_s))
     for side in SIDES:
         _move_foot(sketch, gait, side)
-    _swing_body(sketch, gait)
+    # pelvis and arms swing with the stride
+    phase = np.pi * t / gait.step_s  # 0 when the first side touches down
+    sign = SIDE_SIGN[gait.first_side]
+    turn, drop = sign * np.deg2rad(5.0) * np.cos(phase), sign * np.deg2rad(3.0) * np.sin(phase)
+    sketch.pelvis_m[:, 0] = gait.speed_m_s * t
+    sketch.pelvis_angles += np.stack([np.full_like(t, -np.deg2rad(4.0)), drop, turn], axis=1)
+    sketch.angles["waist"] -= np.stack([np.zeros_like(t), drop, 2.0 * turn], axis=1)
+    for side in SIDES:
+        swing = -SIDE_SIGN[side] * sign * np.cos(phase)
+        sketch.angles[f"shoulder_{side}"][:, 0] += gait.arm_swing_rad * swing
+        sketch.angles[f"elbow_{side}"] += gait.elbow_rad + 0.4 * gait.arm_swing_rad * swing
     return sketch
 
 
 def _move_foot(sketch: Sketch, gait: Gait, side: str) -> None:
-    """One foot's stances and swings."""
     t, foot, stance = sketch.t_s, sketch.feet[side], gait.stance_s
     length = sketch.person.lengths_m[f"foot_{side}"]
     own = [k for k in STEPS if gait.side_of(k) == side]
@@ -159,36 +162,6 @@ def _move_foot(sketch: Sketch, gait: Gait, side: str) -> None:
         foot.cop_ahead_m += (gait.cop_to - gait.cop_from) * length * forward
         if k == 0:
             foot.on_plate[(t > touch - 0.5 * swing) & (t < lift + 0.5 * swing)] = True
-
-
-def _swing_body(sketch: Sketch, gait: Gait) -> None:
-    """Pelvis and arms swing with the stride."""
-    phase = np.pi * sketch.t_s / gait.step_s  # 0 when the first side touches down
-    sign = SIDE_SIGN[gait.first_side]
-    turn = sign * np.deg2rad(5.0) * np.cos(phase)
-    drop = sign * np.deg2rad(3.0) * np.sin(phase)
-    sketch.pelvis_m[:, 0] = gait.speed_m_s * sketch.t_s
-    sketch.pelvis_angles[:, 2] += turn
-    sketch.pelvis_angles[:, 1] += drop
-    sketch.pelvis_angles[:, 0] -= np.deg2rad(4.0)
-    sketch.angles["waist"][:, 2] -= 2.0 * turn
-    sketch.angles["waist"][:, 1] -= drop
-    for side in SIDES:
-        swing = -SIDE_SIGN[side] * sign * np.cos(phase)
-        sketch.angles[f"shoulder_{side}"][:, 0] += gait.arm_swing_rad * swing
-        sketch.angles[f"elbow_{side}"] += gait.elbow_rad + 0.4 * gait.arm_swing_rad * swing
-
-
-def _bouncing_height(sketch: Sketch, gait: Gait) -> np.ndarray:
-    """(T,) height of the centre of mass for ground forces 30 s^2 (1-s)^2 over each stance."""
-    step_s, stance_s = gait.step_s, gait.stance_s
-    time = np.mod(sketch.t_s + 1e-9, step_s) - 1e-9
-    s = np.clip(time / stance_s, 0.0, 1.0)
-    twice = 2.5 * s**4 - 3.0 * s**5 + s**6
-    after = time - np.minimum(time, stance_s)
-    height = G * step_s * stance_s * twice + G * step_s * after
-    height += -0.5 * G * (step_s - stance_s) * time - 0.5 * G * time**2
-    return 0.56 * sketch.person.stature_m + height
 
 
 def _finished(sketch: Sketch, gait: Gait, rng: np.random.Generator, **options: Any) -> Plan:
@@ -228,24 +201,6 @@ class Jumps:
     speed_m_s: float
 
 
-@dataclass(frozen=True)
-class Feet:
-    """How the feet move with each flight.
-
-    roll_rad : of the heels, over push_s and catch_s about take-off and landing.
-    toes_s : in which the load goes to the toes and comes back.
-    """
-
-    roll_rad: float
-    push_s: tuple[float, float]
-    catch_s: tuple[float, float]
-    toes_s: tuple[float, float, float]
-
-
-JUMP = Feet(np.deg2rad(62.0), (0.20, 0.08), (0.08, 0.16), (0.25, 0.1, 0.15))
-HOP = Feet(np.deg2rad(42.0), (0.17, 0.06), (0.06, 0.12), (0.25, 0.05, 0.2))
-
-
 def basketball(
     person: Person, rng: np.random.Generator, duration_s: float, ball_mass_kg: float
 ) -> Plan:
@@ -262,7 +217,7 @@ def basketball(
     jump = Jumps(start, bottom, times[2:3], times[3:4], caught, end, depth, speed)
     side = str(rng.choice(SIDES, p=(0.1, 0.9)))
     release = 0.55 * takeoff + 0.45 * landing
-    _move_feet(sketch, jump, JUMP)
+    _move_feet(sketch, jump, 62.0, (0.20, 0.08), (0.08, 0.16), (0.25, 0.1, 0.15))
     apex = 0.5 * (takeoff + landing)
     overlap = 0.2 * (apex - takeoff)
     up, down = glide(t, takeoff, apex + overlap, 0.06), glide(t, apex - overlap, landing, 0.06)
@@ -303,7 +258,7 @@ def hops(person: Person, rng: np.random.Generator, duration_s: float, _ball: flo
     speed, caught = 0.5 * G * flight, last + catch
     series = Jumps(start, start + dip, takeoffs, landings, caught, caught + settle, depth, speed)
     impact = rng.uniform(1.0, 1.8) * G
-    _move_feet(sketch, series, HOP)
+    _move_feet(sketch, series, 42.0, (0.17, 0.06), (0.06, 0.12), (0.25, 0.05, 0.2))
     for start, end in zip(takeoffs, landings, strict=True):
         rise = 1.1 * (0.5 * (end - start))
         up, down = glide(t, start, start + rise, 0.05), glide(t, end - rise, end, 0.05)
@@ -368,17 +323,11 @@ def _rise(sketch: Sketch, jumps: Jumps) -> np.ndarray:
         since = t[air] - start
         height[air] = TAKEOFF_M + v * since - 0.5 * G * since**2
     for start, end in zip(jumps.landings_s[:-1], jumps.takeoffs_s[1:], strict=True):
-        ground = (t >= start) & (t <= end)
-        height[ground] = TAKEOFF_M + _bounce(t[ground] - start, end - start, v)
+        ground, stance = (t >= start) & (t <= end), end - start
+        since = t[ground] - start  # a force of one hump turns -v into v
+        lifted = (2.0 * v / stance + G) * stance**2 * _hump_twice(since / stance)
+        height[ground] = TAKEOFF_M + (lifted - v * since - 0.5 * G * since**2)
     return height
-
-
-def _bounce(since_s: np.ndarray, stance_s: float, speed_m_s: float) -> np.ndarray:
-    """(T,) height over a stance that turns -speed into speed with a force of one hump."""
-    s = since_s / stance_s
-    twice = 2.5 * s**4 - 3.0 * s**5 + s**6  # double integral of 30 s^2 (1 - s)^2
-    mean = 2.0 * speed_m_s / stance_s + G
-    return mean * stance_s**2 * twice - speed_m_s * since_s - 0.5 * G * since_s**2
 
 
 def _strike(samples: int, length_s: float) -> np.ndarray:
@@ -397,15 +346,26 @@ def _strike(samples: int, length_s: float) -> np.ndarray:
     return heights[0] - less[0] * heights[1] - less[1] * heights[2]
 
 
-def _move_feet(sketch: Sketch, jumps: Jumps, how: Feet) -> None:
-    """Heels rise before each take-off, the toes land first."""
+def _move_feet(
+    sketch: Sketch,
+    jumps: Jumps,
+    roll_deg: float,
+    push_s: tuple[float, float],
+    catch_s: tuple[float, float],
+    toes_s: tuple[float, float, float],
+) -> None:
+    """Heels rise before each take-off, the toes land first.
+
+    roll_deg : of the heels, over push_s and catch_s about take-off and landing.
+    toes_s : in which the load goes to the toes and comes back.
+    """
     t, first, last = sketch.t_s, jumps.takeoffs_s[0], jumps.landings_s[-1]
-    early, late, back = how.toes_s
+    early, late, back = toes_s
     toes = step(t, first - early, first - late) - step(t, last, last + back)
     for side, foot in sketch.feet.items():
         foot.cop_ahead_m += 0.42 * sketch.person.lengths_m[f"foot_{side}"] * toes
         for start, end in zip(jumps.takeoffs_s, jumps.landings_s, strict=True):
-            push = step(t, start - how.push_s[0], start + how.push_s[1])
-            catch = step(t, end - how.catch_s[0], end + how.catch_s[1])
-            foot.toe_roll_rad += how.roll_rad * (push - catch)
+            push = step(t, start - push_s[0], start + push_s[1])
+            catch = step(t, end - catch_s[0], end + catch_s[1])
+            foot.toe_roll_rad += np.deg2rad(roll_deg) * (push - catch)
             foot.share[(t > start) & (t < end)] = 0.0

@@ -112,24 +112,17 @@ def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball:
         elif number < 3:
             for side in SIDES:
                 sketch.angles[f"shoulder_{side}"][:, number - 1] += np.deg2rad(80.0) * held
-        else:
-            _raise_leg(sketch, SIDES[number % 2], number < 5, (start, end, shift), held)
+        else:  # stand on the other leg for the middle, and hold the foot ahead and up
+            side, half = SIDES[number % 2], 0.5 * shift
+            sketch.shift_load(side, 0.5 * window(sketch.t_s, start, end, half))
+            lifted = held * window(sketch.t_s, start + half, end - half, 0.8 * shift)
+            ahead, up, tilt_deg = (0.14, 0.22, 0.0) if number < 5 else (0.30, 0.16, 35.0)
+            foot = sketch.feet[side]
+            foot.raised_m[:, 0] += ahead * person.stature_m * lifted
+            foot.raised_m[:, 1] += up * person.stature_m * lifted
+            foot.tilt_rad[:, 0] += np.deg2rad(tilt_deg) * lifted
     moved_a_little(sketch, rng, 0.2)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
-
-
-def _raise_leg(
-    sketch: Sketch, side: str, bent: bool, times_s: tuple[float, float, float], held: np.ndarray
-) -> None:
-    """Stand on the other leg for the middle of (start, end), and hold the foot ahead and up."""
-    start, end, shift = times_s
-    foot, stature = sketch.feet[side], sketch.person.stature_m
-    sketch.shift_load(side, 0.5 * window(sketch.t_s, start, end, 0.5 * shift))
-    lifted = held * window(sketch.t_s, start + 0.5 * shift, end - 0.5 * shift, 0.8 * shift)
-    ahead, up, tilt_deg = (0.14, 0.22, 0.0) if bent else (0.30, 0.16, 35.0)
-    foot.raised_m[:, 0] += ahead * stature * lifted
-    foot.raised_m[:, 1] += up * stature * lifted
-    foot.tilt_rad[:, 0] += np.deg2rad(tilt_deg) * lifted
 
 
 # --- steps off the plate and back, and onto it and off again --------------------------------------

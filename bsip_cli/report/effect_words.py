@@ -71,10 +71,8 @@ def place_label(effect: str, target: str) -> str:
         return ""
     component, by, quantity = target.partition(" by ")
     if by:  # fz by load
-        which = _WORDS["channels"].get(component, "all components")
-        return f"{which}, " + (
-            f"along with {ALONG[quantity]}" if quantity in ALONG else "on average"
-        )
+        how = f"along with {ALONG[quantity]}" if quantity in ALONG else "on average"
+        return f"{_WORDS['channels'].get(component, 'all components')}, {how}"
     plate, _, channels = target.partition(" ")  # 1 fx>fy, 1 fz or 1
     if effect.startswith("plate_") or plate.isdigit():
         words = " into ".join(_WORDS["channels"].get(one, one) for one in channels.split(">"))

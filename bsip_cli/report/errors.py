@@ -3,7 +3,7 @@ one number; how large they are against yardsticks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,14 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Scale
-from bsip_cli.report.words import (
-    COMPONENTS,
-    TEXTS,
-    count,
-    listing,
-    number,
-    signed,
-)
+from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
@@ -80,18 +73,19 @@ def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
     """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
     no more than it is; trials without numbers are left out."""
     known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
-    of_each = ([gain for gain in known if gain.component == name] for name in COMPONENTS)
-    return tuple(Errors(of[0].component, of[0].unit, _pooled(of)) for of in of_each if of)
-
-
-def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
-    """Root mean square over all frames, of those of intervals of so many frames."""
-    frames = [gain.frames for gain in gains]
-    methods = [m for m in METHODS if all(m in gain.of for gain in gains)]
-    return {
-        method: float(np.sqrt(np.average([g.of[method] ** 2 for g in gains], weights=frames)))
-        for method in methods
-    }
+    pooled = []
+    for name in COMPONENTS:
+        if mine := [gain for gain in known if gain.component == name]:
+            frames = [gain.frames for gain in mine]
+            errors = {
+                method: float(
+                    np.sqrt(np.average([g.of[method] ** 2 for g in mine], weights=frames))
+                )
+                for method in METHODS
+                if all(method in gain.of for gain in mine)
+            }
+            pooled.append(Errors(name, mine[0].unit, errors))
+    return tuple(pooled)
 
 
 def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: float) -> str:
@@ -274,7 +268,14 @@ def _published(variable: str) -> float:
 def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
     """Errors over trials, from rows of one method of each one's table ``fit``: the root mean square
     of those with held-out data, or of all where there are none; NaN where nothing is known."""
-    rows = [_error(fit) for fit in fits]
+    rows = []
+    for fit in fits:
+        of = fit.set_index("component")
+        rms, percent = of["rmse"].to_dict(), of["rmse_percent_bw"].to_dict()
+        cop = float(np.hypot(rms.get("cop_ap", np.nan), rms.get("cop_ml", np.nan)))
+        held_out = bool((of["data"] == "held_out").any())
+        force = float(percent.get("grf_vertical", np.nan))
+        rows.append({COP: cop, FORCE: force, "held_out": held_out})
     known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
     chosen = [row for row in known if row["held_out"]] or known
     found = {}
@@ -282,12 +283,3 @@ def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
         sizes = [row[name] for row in chosen if np.isfinite(row[name])]
         found[name] = float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
     return found
-
-
-def _error(fit: pd.DataFrame) -> Mapping[str, float]:
-    rows = fit.set_index("component")
-    of = rows["rmse"].to_dict()
-    cop = np.hypot(of.get("cop_ap", np.nan), of.get("cop_ml", np.nan))
-    percent = rows["rmse_percent_bw"].to_dict().get("grf_vertical", np.nan)
-    held_out = bool((fit["data"] == "held_out").any())
-    return {COP: float(cop), FORCE: float(percent), "held_out": held_out}

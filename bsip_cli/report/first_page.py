@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,9 +42,6 @@ from bsip_cli.report.words import (
     number,
 )
 from bsip_cli.statistics.methods import OM, RM
-
-if TYPE_CHECKING:
-    from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST_WORDS = 393  # with the title 400
@@ -141,26 +137,23 @@ def _files(record: ParticipantRecord) -> str:
 
 def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The widest pose of the trials with a measured force; nothing without any pose."""
-    found = [(trial, pose) for trial in record.trials for pose in _poses(record, trial)]
+    from bsip_cli.report.figures.person import poses_of, stick_figure  # heavy
+
+    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    how = anterior, record.body_weight(), _POSES
+    moved = [(one, one.kinematics) for one in record.trials if one.kinematics is not None]
+    found = [
+        (trial, pose)
+        for trial, kinematics in moved
+        for pose in poses_of(record.body, kinematics, trial.reconstruction, *how)
+    ]
     if not found:
         return ()
     loaded = [one for one in found if one[1].is_loaded()] or found
     trial, pose = max(loaded, key=lambda one: one[1].reach_m())
-    from bsip_cli.report.figures.person import stick_figure
-
     shows = f"{trial.label}: left grey, right black, ground force green"
     figure = stick_figure(pose, trial.label)
     return (blocks.Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
-
-
-def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
-    from bsip_cli.report.figures.person import poses_of
-
-    if trial.kinematics is None:
-        return ()
-    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
-    measured = trial.kinematics, trial.reconstruction
-    return poses_of(record.body, *measured, anterior, record.body_weight(), _POSES)
 
 
 # --- is anything wrong --------------------------------------------------------------------------

@@ -246,25 +246,24 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
 
 def _table(table: Table) -> Iterator[Block]:
     """Means, the interval of their difference, and its p-value."""
-    headings = [column.heading for column in table.printed_columns()]
-    kept = [
-        k
-        for k, column in enumerate(table.printed_columns())
-        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
-    ]
     if not table.rows:
         yield Paragraph("There are no numbers for this table.", "note")
         return
-    words = sum(table.printed_columns()[k].text for k in kept)
+    columns = [
+        (k, column)
+        for k, column in enumerate(table.printed_columns())
+        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
+    ]
     rows: list[tuple[str | Cell, ...]] = []
     group = ""
     for row in table.rows:
         if row.group != group:
             group = row.group
-            rows.append((Cell(group, "group"), *[""] * (len(kept) - 1)))
+            rows.append((Cell(group, "group"), *[""] * (len(columns) - 1)))
         cells = table.printed_cells(row)
-        rows.append(tuple(cells[k] for k in kept))
-    yield Grid(tuple(headings[k] for k in kept), tuple(rows), words=max(1, words))
+        rows.append(tuple(cells[k] for k, _ in columns))
+    words = sum(column.text for _, column in columns)
+    yield Grid(tuple(one.heading for _, one in columns), tuple(rows), words=max(1, words))
     yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
 
 
@@ -279,11 +278,15 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         return
     if not ratios.held_out:
         yield Paragraph(TEXTS["nobody_held_out"], "warning")
-    worse = []
+    worse, rows = [], []
     for name in names:
         over = ratios.over_best_other(name)
-        fewer, more, _ = _counts(over)
-        worse += [component_label(name)] if _typical(over) > 0.0 or more > fewer else []
+        better = int((over < 1 - SAME_WITHIN).sum())
+        fewer, everyone = int((over > 1 + SAME_WITHIN).sum()), int(np.isfinite(over).sum())
+        worse += [component_label(name)] if _typical(over) > 0.0 or fewer > better else []
+        changes = (signed(100.0 * _typical(ratios.over_rm(name, m))) for m in (RM_MASS, OM))
+        counts = better, fewer, everyone - better - fewer, everyone
+        rows.append((component_label(name), *changes, *map(str, counts)))
     yield Paragraph(
         f"RM or RM+mass follows better on the whole, or in more participants, in: {listing(worse)}."
         if worse
@@ -299,7 +302,7 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
     yield picture("gain", figure, data.reset_index(), where=where)
     yield Grid(
         ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
-        tuple(_row(name, ratios) for name in names),
+        tuple(rows),
         f"Change of the error from RM. The same: within {percent(SAME_WITHIN)} %.",
         groups=(("", 1), ("typical change [%]", 2), ("number of participants", 4)),
     )
@@ -319,24 +322,6 @@ def _typical(ratios: np.ndarray) -> float:
     """Relative change of the errors, their geometric mean; NaN without any."""
     known = ratios[np.isfinite(ratios)]
     return float(np.exp(np.log(known).mean())) - 1.0 if len(known) else float("nan")
-
-
-def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
-    """In how many participants OM is better, in how many worse, and of how many."""
-    better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
-    return better, worse, int(np.isfinite(ratios).sum())
-
-
-def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
-    better, worse, everyone = _counts(ratios.over_best_other(component))
-    return (
-        component_label(component),
-        *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),
-        str(better),
-        str(worse),
-        str(everyone - better - worse),
-        str(everyone),
-    )
 
 
 # --- what is wrong in whose recordings, and what several people share -----------------------------

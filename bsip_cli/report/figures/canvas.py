@@ -135,15 +135,10 @@ def to_svg(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
-        _lay_out(figure)
+        FigureCanvasSVG(figure)
+        if engine := figure.get_layout_engine():  # once; else saving would draw all twice
+            figure.set_dpi(_DPI_OF_SVG)
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=200)
     return buffer.getvalue().replace(b"'DejaVu Sans'", _FONTS)
-
-
-def _lay_out(figure: Figure) -> None:
-    """Once; with a layout engine of its own, saving would draw all twice."""
-    FigureCanvasSVG(figure)
-    if engine := figure.get_layout_engine():
-        figure.set_dpi(_DPI_OF_SVG)
-        engine.execute(figure)
-        figure.set_layout_engine(None)

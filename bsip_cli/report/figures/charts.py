@@ -121,14 +121,8 @@ def segment_masses(data: pd.DataFrame) -> Figure:
     canvas.legend_above(masses)
     differences.axvline(0.0, color=canvas.ORANGE, lw=1.2, ls="--")
     spread = np.nan_to_num(Z95 * data["om_sd_kg"])
-    dots: dict[str, Any] = {
-        "fmt": "o",
-        "ms": 4,
-        "color": canvas.BLUE,
-        "ecolor": canvas.SOFT,
-        "elinewidth": 1.1,
-        "capsize": 2,
-    }
+    dots: dict[str, Any] = {"fmt": "o", "ms": 4, "color": canvas.BLUE}
+    dots |= {"ecolor": canvas.SOFT, "elinewidth": 1.1, "capsize": 2}
     differences.errorbar(data["om_kg"] - data["rm_kg"], rows, xerr=spread, **dots)
     differences.set_xlabel("OM − RM [kg], 95 % interval")
     shares.barh(rows, 100.0, height=0.55, color=canvas.FAINT)

@@ -58,7 +58,11 @@ def participant_document(record: records.ParticipantRecord) -> Document:
             diagnosis_section(record),
             errors.section(record),
             errors.joints_section(record),
-            parameters_section(record),
+            Section(
+                "parameters",
+                "Which segment parameters come out?",
+                (*_choice(record), *_masses(record), *_next(record)),
+            ),
             recording_section(record),
             Section("made", "How was it made, and what can it not know?", tuple(made)),
             WORDS,
@@ -85,37 +89,22 @@ def recording_section(record: records.ParticipantRecord) -> Section:
 
 
 def _trials(record: records.ParticipantRecord) -> Grid:
-    uses = uses_of(record)
-    head = (
-        "recording",
-        "role",
-        "use",
-        "duration [s]",
-        "forces compared [%]",
-        "pose known [%]",
-        "markers [mm]",
-    )
-    rows = tuple(_trial_row(trial, uses[trial.stem].in_words()) for trial in record.trials)
-    return Grid(head, rows, TEXTS["captions"]["trials"], words=3)
-
-
-def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
-    role = ROLES[trial.role]
-    frame = trial.kinematics
-    if frame is None or frame.empty:
-        return (trial.label, role, use, MISSING, MISSING, MISSING, MISSING)
-    compared = np.nan
-    if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
-        compared = float(records.flags_of(trial.reconstruction, "valid").mean())
-    return (
-        trial.label,
-        role,
-        use,
-        number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
-        percent(compared),
-        percent(float(frame["determined"].astype(float).mean())),
-        number(trial.markers_mm()),
-    )
+    uses, rows = uses_of(record), []
+    for trial in record.trials:
+        frame, numbers = trial.kinematics, (MISSING,) * 4
+        if frame is not None and not frame.empty:
+            compared = np.nan
+            if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
+                compared = float(records.flags_of(trial.reconstruction, "valid").mean())
+            numbers = (
+                number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
+                percent(compared),
+                percent(float(frame["determined"].astype(float).mean())),
+                number(trial.markers_mm()),
+            )
+        rows.append((trial.label, ROLES[trial.role], uses[trial.stem].in_words(), *numbers))
+    head = ("recording", "role", "use", "duration [s]", "forces compared [%]", "pose known [%]")
+    return Grid((*head, "markers [mm]"), tuple(rows), TEXTS["captions"]["trials"], words=3)
 
 
 def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
@@ -131,13 +120,12 @@ def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
 def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
     """What ingest repaired, warned of or left out: one line per check, with its recordings."""
     found: dict[tuple[str, str, str], dict[str, set[str]]] = {}
-    for trial in record.trials:
-        if trial.quality is not None:
-            for row in trial.quality.to_dict("records"):
-                if row["level"] in _LEVELS:
-                    key = (row["level"], row["check"], row["action"])
-                    what = f"{row['subject']} {row['found']}".strip()
-                    found.setdefault(key, {}).setdefault(trial.label, set()).add(what)
+    known = ((trial.label, t) for trial in record.trials if (t := trial.quality) is not None)
+    for label, table in known:
+        for row in table[table["level"].isin(_LEVELS)].to_dict("records"):
+            key = (row["level"], row["check"], row["action"])
+            what = f"{row['subject']} {row['found']}".strip()
+            found.setdefault(key, {}).setdefault(label, set()).add(what)
     lines = []
     for level, check, action in sorted(found, key=lambda key: _LEVELS.index(key[0])):
         trials = found[level, check, action]
@@ -193,11 +181,6 @@ _FROM_TABLE = 0.2  # less of the variance than this removed: the number is the t
 _COM = ["com_x_m", "com_y_m", "com_z_m"]
 _RATIOS = ("om", "rm_mass", "om_rm_mass")
 _MOST_STEPS = 3
-
-
-def parameters_section(record: records.ParticipantRecord) -> Section:
-    blocks = (*_choice(record), *_masses(record), *_next(record))
-    return Section("parameters", "Which segment parameters come out?", blocks)
 
 
 def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
@@ -268,15 +251,9 @@ def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     table, own = shown["rm_kg"], shown["om_kg"]
     total = ("whole body", number(table.sum(), 2), number(own.sum(), 2))
     change = signed(100.0 * (own.sum() / table.sum() - 1.0))
+    head = ("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "centre of mass moves [mm]")
     yield Grid(
-        (
-            "segment",
-            "RM [kg]",
-            "OM [kg] ± sd",
-            "change [%]",
-            "centre of mass moves [mm]",
-            "data decide [%]",
-        ),
+        (*head, "data decide [%]"),
         (*rows, (*total, change, "", "")),
         "Centres of mass and tensors of inertia with their errors are in the CSV.",
         name="segment_parameters",
@@ -294,16 +271,12 @@ def _next(record: records.ParticipantRecord) -> Iterator[Block]:
     silent = [segment_label(n) for n in combinations.loc[combinations["value"] == 0, "name"]]
     if silent:
         yield Paragraph(f"These recordings add nothing to the table for {listing(silent)}.")
-    steps = table[table["quantity"] == "next"].head(_MOST_STEPS)
-    if len(steps):
-        yield Heading("What to record next time")
-        yield Numbered(
-            tuple(
-                f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
-                f"data, most of all for the {segment_label(row['segment'])}."
-                for row in steps.to_dict("records")
-            )
-        )
+    steps = [
+        f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
+        f"data, most of all for the {segment_label(row['segment'])}."
+        for row in table[table["quantity"] == "next"].head(_MOST_STEPS).to_dict("records")
+    ]
+    yield from [Heading("What to record next time"), Numbered(tuple(steps))] if steps else []
 
 
 # --- what is wrong, and how sure that is: causes, size and effect, what could not be seen ----------
@@ -343,14 +316,10 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
     rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
+    sure = (verdict.probability_words(one.probability) or MISSING for one in rejected)
     rows = tuple(
-        (
-            one.label,
-            verdict.probability_words(one.probability) or MISSING,
-            number(one.rms_change, 1),
-            one.removes(),
-        )
-        for one in rejected
+        (one.label, probability, number(one.rms_change, 1), one.removes())
+        for one, probability in zip(rejected, sure, strict=True)
     )
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
     return (Grid(head, rows, TEXTS["captions"]["nearest"]),)

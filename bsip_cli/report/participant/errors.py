@@ -96,9 +96,8 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     for component in COMPONENTS:
         size, unit = budget_words.size_of(record.budget, component)
         if size >= budget_words.LEAST_REPORTED_SIZE:
-            parts = budget_words.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
-            bars.append(Bar(name, parts))
+            bars.append(Bar(name, budget_words.pieces(record.budget, component, found)))
     if bars:
         figure = error_bars(bars, budget_words.overall_pieces(record.budget, found))
         yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])
@@ -151,17 +150,11 @@ def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator
     """What one number for the whole mass is, and does without identification."""
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
-    found = [
-        m
-        for m in errors.pooled_gains(held_out)
-        if m.component == "grf_vertical" and RM_MASS in m.of
-    ]
-    if len(rows) and found:
-        (mean,) = found
+    mean = {one.component: one for one in errors.pooled_gains(held_out)}.get("grf_vertical")
+    if len(rows) and mean is not None and RM_MASS in mean.of:
         over = errors.relative_change(mean.of[RM_MASS], mean.of[OM])
-        said = errors.one_number_alone(
-            component_label(mean.component), mean.change(RM_MASS), mean.change(), over
-        )
+        changes = mean.change(RM_MASS), mean.change(), over
+        said = errors.one_number_alone(component_label(mean.component), *changes)
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")
 
 
@@ -250,15 +243,11 @@ def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
     mine = rows[(rows["joint"] == joint) & (rows["axis"] == axis)]
     of = {method: mine[mine["method"] == method] for method in methods}
     time = of[methods[0]]["time_s"].to_numpy()
-    return Panel(
-        f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]",
-        time,
-        {
-            EXTENDED if is_extended(method) else method: own["moment_Nm"].to_numpy()
-            for method, own in of.items()
-        },
-        {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM},
-    )
+    named = {
+        EXTENDED if is_extended(m) else m: own["moment_Nm"].to_numpy() for m, own in of.items()
+    }
+    spreads = {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM}
+    return Panel(f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]", time, named, spreads)
 
 
 # --- peaks --------------------------------------------------------------------------------------
@@ -270,9 +259,9 @@ def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
-def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)) -> Iterator[str]:
+def largest_changes(peaks: pd.DataFrame) -> Iterator[str]:
     """What identification, and each named fault, changes most: a sentence each."""
-    for method, rows in _changed(peaks, kinds).groupby("method", sort=False):
+    for method, rows in _changed(peaks).groupby("method", sort=False):
         if method == OM or is_extended(str(method)):
             most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
             what = "Identification (OM against RM)"
@@ -294,7 +283,7 @@ def moment_change(
     alike = [c for other in causes for c in other if c.effect == one.effect]
     if len(cause) > 1 or any(c != one and {*c.trials} & {*one.trials} for c in alike):
         return ""
-    known = _changed(peaks, (*_LEGS, *_ARMS))
+    known = _changed(peaks)
     is_of_it = known["method"].str.endswith(f"+{one.effect}")
     rows = known[is_of_it & known["trial"].isin(one.trials)]
     if rows.empty:
@@ -309,11 +298,11 @@ def moment_change(
     )
 
 
-def _changed(peaks: pd.DataFrame, kinds: Sequence[str]) -> pd.DataFrame:
-    """Rows of known changes at joints of these kinds."""
+def _changed(peaks: pd.DataFrame) -> pd.DataFrame:
+    """Rows of known changes at joints of legs and arms."""
     if peaks.empty:
         return pd.DataFrame(columns=["method", "trial"], dtype=str)
-    asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
+    asked = peaks["joint"].str.rpartition("_")[0].isin((*_LEGS, *_ARMS))
     return peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
 
 
@@ -321,7 +310,21 @@ def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[Tria
     peaks = trial.joint_peaks
     assert peaks is not None
     faults = [name for name in dict.fromkeys(peaks["method"]) if is_extended(name)]
-    rows = [_peak_row(peaks, joint, faults) for joint in joints]
+    rows = []
+    for joint in joints:
+        axis = _axis(peaks, joint)
+        of_axis = peaks[(peaks["joint"] == joint) & (peaks["axis"] == axis)].to_dict("records")
+        mine = {row["method"]: row for row in of_axis}
+        own = mine.get(OM) or mine[RM]
+        changes = (mine[name] for name in (OM, *faults) if name in mine)
+        cells = (
+            f"{in_words(joint)} {axis.replace('_', ' ')}",
+            f"{number(own['peak_Nm'], 1)} ± {number(Z95 * own['peak_sd_Nm'], 1)}",
+            number(own["peak_Nm_kg"], 2),
+            number(own["peak_at_s"], 2),
+            *(f"{signed(c['change_Nm'], 1)} ({number(c['change_percent'], 0)})" for c in changes),
+        )
+        rows.append(cells)
     names = [f"{effect_title(name.rpartition('+')[2])} [N m (%)]" for name in faults]
     return Grid(
         ("joint", "peak, OM [N m]", "[N m/kg]", "at [s]", "OM − RM [N m (%)]", *names),
@@ -330,21 +333,6 @@ def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[Tria
         "of the joint's peak. A change beyond the interval matters.",
         name="joint_peaks",
         data=all_peaks(trials),
-    )
-
-
-def _peak_row(peaks: pd.DataFrame, joint: str, faults: Sequence[str]) -> tuple[str, ...]:
-    axis = _axis(peaks, joint)
-    rows = peaks[(peaks["joint"] == joint) & (peaks["axis"] == axis)].to_dict("records")
-    mine = {row["method"]: row for row in rows}
-    own = mine.get(OM) or mine[RM]
-    changes = (mine[name] for name in (OM, *faults) if name in mine)
-    return (
-        f"{in_words(joint)} {axis.replace('_', ' ')}",
-        f"{number(own['peak_Nm'], 1)} ± {number(Z95 * own['peak_sd_Nm'], 1)}",
-        number(own["peak_Nm_kg"], 2),
-        number(own["peak_at_s"], 2),
-        *(f"{signed(c['change_Nm'], 1)} ({number(c['change_percent'], 0)})" for c in changes),
     )
 
 

@@ -7,6 +7,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import isnan
 from pathlib import Path
 
@@ -132,26 +133,23 @@ def unit_label(unit: str) -> str:
 
 
 def number(decimals: int) -> Callable[[float], str]:
-    return lambda value: ABSENT if isnan(value) else _rounded(value, decimals)
+    return partial(_rounded, decimals=decimals)
 
 
 def mean_sd(decimals: int) -> Callable[[float, float], str]:
     """M(SD), in whole numbers from a thousand on; one participant has no SD."""
 
     def form(mean: float, sd: float) -> str:
-        if isnan(mean):
-            return ABSENT
         places = number(0 if abs(mean) >= 1000.0 else decimals)
-        return f"{places(mean)}({places(sd)})"
+        return ABSENT if isnan(mean) else f"{places(mean)}({places(sd)})"
 
     return form
 
 
 def interval(decimals: int) -> Callable[[float, float], str]:
     def form(low: float, high: float) -> str:
-        if isnan(low) or isnan(high):
-            return ABSENT
-        return f"[{_rounded(low, decimals)}, {_rounded(high, decimals)}]"
+        ends = [_rounded(end, decimals) for end in (low, high)]
+        return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
 
     return form
 
@@ -173,6 +171,8 @@ def counts_of(a: float, b: float, n: float) -> str:
 
 
 def _rounded(value: float, decimals: int) -> str:
+    if isnan(value):
+        return ABSENT
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 

@@ -140,11 +140,8 @@ def segment_mass(results: model.Results, criteria: Criteria) -> model.Table:
     def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
         of_share = Topic(topic.table, topic.variable + DATA_SHARE, topic.task, topic.role, "1")
         share = results.find(of_share, "description", OM, "")
-        own: dict[str, model.Cell] = {
-            "mass_data_share": share.mean_a,
-            "mass_data_share_sd": share.sd_a,
-        }
-        return own | {"segment": topic.variable}, ""
+        own: dict[str, model.Cell] = {"segment": topic.variable, "mass_data_share": share.mean_a}
+        return own | {"mass_data_share_sd": share.sd_a}, ""
 
     return _paired(
         "table1_segment_mass",
@@ -193,11 +190,8 @@ def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
     tests = [results.find(topic, "paired_t") for topic in topics]
 
     def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
-        own: dict[str, model.Cell] = {
-            "quantity": topic.variable,
-            "task": topic.task,
-            "role": topic.role,
-        }
+        own: dict[str, model.Cell] = {"quantity": topic.variable, "task": topic.task}
+        own["role"] = topic.role
         group = f"{_QUANTITIES[topic.variable]} [{model.unit_label(topic.unit)}]"
         return own | {"label": task_label(topic)}, group
 

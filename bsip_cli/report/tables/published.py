@@ -38,13 +38,8 @@ def printed(paper: Paper, table: PrintedTable) -> Table:
 
 def audited(paper: Paper) -> Table:
     """What a paper's own numbers contradict."""
-    headings = {
-        "row": "Where",
-        "what": "What",
-        "printed": "In print",
-        "recomputed": "From its other numbers",
-        "reading": "Likely reading",
-    }
+    headings = {"row": "Where", "what": "What", "printed": "In print"}
+    headings |= {"recomputed": "From its other numbers", "reading": "Likely reading"}
     columns = tuple(Column((name,), heading, text=True) for name, heading in headings.items())
     rows = tuple(Row(slip, group=f"Table {slip['table']}") for slip in paper.slips)
     title = f"{paper.name}: what cannot be as printed."

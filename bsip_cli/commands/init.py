@@ -61,22 +61,15 @@ def read_tables(
             if name is None or name in said:
                 continue
             try:
-                stated, notes_of_row = _stated(replace(row, id=name), table)
+                person = participants.participant_of(replace(row, id=name), table)
             except BadDataError as refusal:
                 notes.append(str(refusal))
                 continue
-            said[name] = file, stated
-            notes += notes_of_row
+            is_stated = row.cells[table.columns["sex"].index].casefold() not in participants.UNKNOWN
+            sex = person.sex if is_stated else ""
+            said[name] = file, StatedPerson(person.mass_kg, person.height_m, sex)
+            notes += person.notes
     return said, notes
-
-
-def _stated(
-    row: participants.Row, table: participants.PeopleTable
-) -> tuple[StatedPerson, tuple[str, ...]]:
-    person = participants.participant_of(row, table)
-    is_stated = row.cells[table.columns["sex"].index].casefold() not in participants.UNKNOWN
-    stated = StatedPerson(person.mass_kg, person.height_m, person.sex if is_stated else "")
-    return stated, person.notes
 
 
 # --- the marker set of a study that ``bsip init`` makes: a shipped one, or one of the labels ------
@@ -155,6 +148,10 @@ class _Plan:
     tables: tuple[Path, ...]
     notes: tuple[str, ...]
 
+    @property
+    def made(self) -> str:
+        return "linked" if self.link else "copied"
+
 
 def init_command(given: tuple[Path, ...], out: Path, participant: str, link: bool) -> int:
     """Make the study, and print what lies where and what was not used.
@@ -185,7 +182,9 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
             "no recording can be used" if unused else "no files",
             file=", ".join(map(str, given)),
             expected="C3D files, or TRC files with their MOT or STO next to them",
-            remedy=_remedy(unused),
+            remedy="correct what is said of each"
+            if any(one.why != NO_RECORDING for one in unused)
+            else "export the trials so, or name the folder they lie in",
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
@@ -193,12 +192,6 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
     _write(plan)
     _say(_in_words(plan))
     return 3 if any(one.is_fault for one in unused) else 0
-
-
-def _remedy(unused: Sequence[Unused]) -> str:
-    if any(one.why != NO_RECORDING for one in unused):
-        return "correct what is said of each"
-    return "export the trials so, or name the folder they lie in"
 
 
 def _check_out(out: Path) -> None:
@@ -296,9 +289,9 @@ def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
 
 def _source_rows(plan: _Plan) -> Iterator[tuple[str, ...]]:
     yield _COLUMNS
-    made = "linked" if plan.link else "copied"
     for source, target, named in _files(plan):
-        yield str(target), str(source.absolute()), made, named.participant, named.task, ""
+        place = str(target), str(source.absolute()), plan.made
+        yield *place, named.participant, named.task, ""
     for table in plan.tables:
         yield "participants.tsv", str(table.absolute()), "read", "n/a", "n/a", ""
     for one in sorted(plan.unused, key=lambda one: one.path):
@@ -361,8 +354,7 @@ def _in_words(plan: _Plan) -> Iterator[str]:
     yield f"marker set: {plan.markers.name}"
     yield from plan.notes
     yield from _unused_lines(plan.unused)
-    files = "linked" if plan.link else "copied"
-    yield f"{len([*_files(plan)])} files {files}; sources.tsv says what came from where"
+    yield f"{len([*_files(plan)])} files {plan.made}; sources.tsv says what came from where"
     results = plan.out / "derivatives" / "bsip"
     yield f"next: bsip run {quote(str(plan.out))} --out {quote(str(results))}"
 

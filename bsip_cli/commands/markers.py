@@ -34,12 +34,8 @@ def markers_command(file: Path, marker_set: str, prefix: str, write: Path | None
     recording = read_recording(file)
     size = f"{len(recording.labels)} markers, {recording.n_frames} frames"
     corrected = [one for one in recording.findings if one.check in ("labels", "points")]
-    _say(
-        [
-            f"{file}: {size} at {recording.marker_rate_hz:g} Hz",
-            *(f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected),
-        ]
-    )
+    done = [f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected]
+    _say([f"{file}: {size} at {recording.marker_rate_hz:g} Hz", *done])
     guess, chosen = _chosen(recording, marker_set, prefix)
     complete = bool(chosen.markers) and _compared(recording, chosen, prefix)
     if not chosen.markers:
@@ -153,14 +149,10 @@ def _segment_rows(
 
 
 def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
-    """Write the labels of the file as a marker set; never over a file that is there.
-
-    UsageError: the file that was asked for is there, or cannot be written.
-    """
+    """Write the labels of the file as a marker set; never over a file that is there."""
     target = write or Path(f"{file.stem.replace(' ', '_')}_markers.toml")
-    text = starter_toml(
-        guess.marker_set, guess.unknown, printable(file.name), printable(target.name)
-    )
+    names = printable(file.name), printable(target.name)
+    text = starter_toml(guess.marker_set, guess.unknown, *names)
     try:
         with target.open("x", encoding="utf-8") as handle:
             handle.write(text)
@@ -176,10 +168,5 @@ def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
     except OSError as error:
         raise UsageError(f"cannot be written ({error.strerror})", file=target) from None
     again = f"bsip markers {quote(str(file))} --marker-set {quote(str(target))}"
-    _say(
-        [
-            "",
-            f"wrote {target}: a first marker set, guessed from the labels; correct it, check it "
-            f"with `{again}`, and name it in study.toml",
-        ]
-    )
+    said = f"wrote {target}: a first marker set, guessed from the labels; correct it, check it "
+    _say(["", f"{said}with `{again}`, and name it in study.toml"])

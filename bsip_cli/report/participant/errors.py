@@ -3,7 +3,7 @@ makes them; and what identification and named faults change at the joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -254,9 +254,13 @@ def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
 
 
 def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
-    """Of all recordings, with a column ``trial``."""
-    tables = [t.joint_peaks.assign(trial=t.stem) for t in trials if t.joint_peaks is not None]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+    return peaks_of((t.stem, t.joint_peaks) for t in trials if t.joint_peaks is not None)
+
+
+def peaks_of(tables: Iterable[tuple[str, pd.DataFrame]]) -> pd.DataFrame:
+    """Of all recordings (stem, ``joint-peaks``), with a column ``trial``."""
+    every = [table.assign(trial=stem) for stem, table in tables]
+    return pd.concat(every, ignore_index=True) if every else pd.DataFrame()
 
 
 def largest_changes(peaks: pd.DataFrame) -> Iterator[str]:

@@ -143,10 +143,8 @@ class _Cohort:
             self._lacks(f"{participant.id} has no identified parameters", 1, 6)
             return None
         frame = self._unit.read("bsip", participant=participant)
-        lacking = [method for method in (OM, RM) if method not in set(frame["method"])]
-        if lacking:
-            what = f"{participant.id} has no parameters of {' and '.join(lacking)}"
-            self._lacks(what, 1, 6)
+        if lacking := [method for method in (OM, RM) if method not in set(frame["method"])]:
+            self._lacks(f"{participant.id} has no parameters of {' and '.join(lacking)}", 1, 6)
         return frame
 
     def _recordings(self, participant: Participant) -> Iterator[Recording]:

@@ -104,14 +104,9 @@ def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict
         masses.append(recording.stated.mass_kg)
         for plate, intervals in masses_alone(recording).items():
             shown.setdefault(plate, {})[trial.stem] = intervals
-    options = unit.config.ingest
-    return plate_gains(
-        shown,
-        next((kg for kg in masses if kg is not None), None),
-        options.mass_half_width_percent,
-        options.mass_tolerance_percent,
-        options.mass_gross_percent,
-    )
+    options, stated_kg = unit.config.ingest, next((kg for kg in masses if kg is not None), None)
+    limits = options.mass_half_width_percent, options.mass_tolerance_percent
+    return plate_gains(shown, stated_kg, *limits, options.mass_gross_percent)
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> set[str]:
@@ -215,9 +210,8 @@ def _verdict(row: dict) -> Verdict:
     )
     others, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
     said = {name: row[name] for name in ("refusal", "doubted", "gain")}
-    return Verdict(
-        reading, before, after, alternatives=tuple(others), repeats=tuple(repeats), **said
-    )
+    said |= {"alternatives": tuple(others), "repeats": tuple(repeats)}
+    return Verdict(reading, before, after, **said)
 
 
 def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:

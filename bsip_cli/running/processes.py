@@ -214,10 +214,8 @@ def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
 
 
 def _serve(pipe: Connection) -> None:
-    """Take tasks until the pipe is closed, or a signal comes.
-
-    Their imports, which take seconds, come with the first task: by then signals are answered.
-    """
+    """Take tasks until the pipe is closed, or a signal comes. Their imports, which take seconds,
+    come with the first task: by then signals are answered."""
     try:
         raise_when_ended(once=True)
         threading.Thread(target=_leave_with_parent, daemon=True).start()

@@ -205,16 +205,13 @@ class _Voice:
         for (stage, sentence), units in self.said.items():
             if len(units) > 1:
                 others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
-                _write(stage, others)
+                tqdm.write(f"{stage}: {others}", file=sys.stderr)
 
 
 def _say(outcome: Outcome, sentence: str) -> None:
     lines = sentence.split("\n") if outcome.state == "bug" else [sentence]  # with its trace
-    _write(outcome.stage, "\n".join(map(printable, lines)))
-
-
-def _write(stage: str, text: str) -> None:
-    tqdm.write(f"{stage}: {text}", file=sys.stderr)
+    text = "\n".join(map(printable, lines))
+    tqdm.write(f"{outcome.stage}: {text}", file=sys.stderr)
 
 
 def _config(root: Path, config_file: Path | None, estimators: tuple[str, ...]) -> Config:

@@ -60,14 +60,8 @@ def cohens_d_pooled(mean_x: float, sd_x: float, mean_y: float, sd_y: float) -> f
 
 def described_pair(x: NDArray[np.float64], y: NDArray[np.float64]) -> TestResult:
     """Means and SDs of finite pairs."""
-    return TestResult(
-        n=len(x),
-        mean_a=mean_of(x),
-        sd_a=standard_deviation(x),
-        mean_b=mean_of(y),
-        sd_b=standard_deviation(y),
-        difference=mean_of(x - y),
-    )
+    known = TestResult(n=len(x), mean_a=mean_of(x), mean_b=mean_of(y), difference=mean_of(x - y))
+    return known.with_(sd_a=standard_deviation(x), sd_b=standard_deviation(y))
 
 
 def paired_t(x: ArrayLike, y: ArrayLike, confidence: float = 0.95) -> TestResult:
@@ -110,11 +104,7 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     nonzero = whole[whole != 0] * unit
     n, m = len(whole), len(nonzero)
     estimate = _hodges_lehmann(whole) * unit if n else nan
-    if m < MINIMUM_FOR_WILCOXON:
-        reason = (
-            f"Wilcoxon's test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-            f"there are {m}."
-        )
+    if reason := _too_few("Wilcoxon's", m):
         return TestResult(n=n, difference=estimate, reason=reason)
     ranks = stats.rankdata(np.abs(nonzero))
     has_ties = len(np.unique(ranks)) < m
@@ -162,12 +152,16 @@ def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
     own, other = int(np.sum(x < y)), int(np.sum(y < x))
     share = own / len(x) if len(x) else nan
     found = TestResult(n=len(x), effect_size=share, count_a=own, count_b=other)
-    if own + other >= MINIMUM_FOR_WILCOXON:
-        return found.with_(p_value=float(stats.binomtest(own, own + other).pvalue))
-    return found.with_(
-        reason=f"The sign test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-        f"there are {own + other}."
-    )
+    if reason := _too_few("The sign", own + other):
+        return found.with_(reason=reason)
+    return found.with_(p_value=float(stats.binomtest(own, own + other).pvalue))
+
+
+def _too_few(which: str, pairs: int) -> str:
+    if pairs >= MINIMUM_FOR_WILCOXON:
+        return ""
+    needs = f"{which} test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05"
+    return f"{needs}, there are {pairs}."
 
 
 def _why_no_t(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
@@ -297,14 +291,10 @@ def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[Tes
     pairs = list(combinations(range(k), 2))
     confidence = 1.0 - alpha / len(pairs)
     after = {(i, j): paired_t(table[:, i], table[:, j], confidence) for i, j in pairs}
-    return found.with_(
-        statistic=f,
-        df1=epsilon * df_effect,
-        df2=epsilon * df_error,
-        p_value=float(stats.f.sf(f, epsilon * df_effect, epsilon * df_error)),
-        effect_size=ss_effect / (ss_effect + ss_error),
-        epsilon=epsilon,
-    ), _bonferroni(after)
+    df1, df2 = epsilon * df_effect, epsilon * df_error
+    p, share = float(stats.f.sf(f, df1, df2)), ss_effect / (ss_effect + ss_error)
+    numbers = {"statistic": f, "df1": df1, "df2": df2, "p_value": p, "effect_size": share}
+    return found.with_(**numbers, epsilon=epsilon), _bonferroni(after)
 
 
 def _nothing_left(residual: NDArray[np.float64], values: NDArray[np.float64]) -> bool:

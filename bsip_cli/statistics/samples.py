@@ -51,10 +51,7 @@ class TestResult:
         return replace(self, **numbers)
 
 
-# --- the normal distribution ----------------------------------------------------------------------
-
-
-Z95 = 1.959964  # standard deviations to either side that hold 95 %
+Z95 = 1.959964  # standard deviations to either side that hold 95 % of a normal distribution
 
 
 # --- p values of several tests, corrected for their number ----------------------------------------
@@ -112,11 +109,12 @@ def lilliefors_test(x: ArrayLike) -> TestResult:
     """
     values = finite_values(x)
     n = len(values)
+    reason = ""
     if n < MINIMUM_FOR_LILLIEFORS:
         reason = f"Lilliefors' test needs {MINIMUM_FOR_LILLIEFORS} values, there are {n}."
-        return TestResult(n=n, reason=reason)
-    if is_constant(values):
+    elif is_constant(values):
         reason = "All values are equal, so there is no distribution to test."
+    if reason:
         return TestResult(n=n, reason=reason)
     from statsmodels.stats.diagnostic import lilliefors
 

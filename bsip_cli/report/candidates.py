@@ -101,16 +101,10 @@ def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
 
 def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
     first = rows[0]
-    numbers = tuple(
-        Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
-        for r in rows
-        if r["parameter"]
-    )
-    alone = (
-        Number(r["parameter"], r["unit"], r["own_estimate"], r["own_low"], r["own_high"])
-        for r in rows
-        if isfinite(r["own_estimate"])
-    )
+    sizes = itemgetter("parameter", "unit", "estimate", "ci_low", "ci_high")
+    own = itemgetter("parameter", "unit", "own_estimate", "own_low", "own_high")
+    numbers = tuple(Number(*sizes(row)) for row in rows if row["parameter"])
+    alone = (Number(*own(row)) for row in rows if isfinite(row["own_estimate"]))
     texts = first["what"], first["short"], first["against"], first["remark"]
     what, short, against, remark = map(true_minus, texts)
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))

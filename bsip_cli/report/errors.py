@@ -56,16 +56,10 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         column, unit = "rmse", str(known[OM]["unit"])
         if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
             column, unit = "rmse_percent_bw", "% BW"
-        gains.append(
-            Gain(
-                component,
-                unit,
-                {method: float(row[column]) for method, row in known.items()},
-                trial,
-                min(int(row["n"]) for row in known.values()),
-                known[OM]["data"] == "held_out",
-            )
-        )
+        errors = {method: float(row[column]) for method, row in known.items()}
+        frames = min(int(row["n"]) for row in known.values())
+        held_out = known[OM]["data"] == "held_out"
+        gains.append(Gain(component, unit, errors, trial, frames, held_out))
     return tuple(gains)
 
 
@@ -134,11 +128,8 @@ def use_sentence(
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
     said = f"{use} {', and '.join([*others, most])}{compared}."
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body; other errors made it."
-        for m in rare
-    ]
-    return " ".join([said, *warned])
+    why = "fewer than 1 in 100 people have such a body; other errors made it"
+    return " ".join([said, *(f"Never use {method}: {why}." for method in rare)])
 
 
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
@@ -157,9 +148,8 @@ def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
         "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
-        return (
-            f": {where}its error is {scaled} than RM's, and OM's error {over_scaled} than RM+mass's"
-        )
+        than_om = f"OM's error {over_scaled} than RM+mass's"
+        return f": {where}its error is {scaled} than RM's, and {than_om}"
     said = f"{om} than RM's and RM+mass's"
     if om != over_scaled:
         said = f"{om} than RM's, {over_scaled} than RM+mass's"
@@ -234,17 +224,10 @@ class Yardstick:
     def scale(self, value: float) -> Scale:
         """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
         end = ENDS_AT * self.limit
-        return Scale(
-            self.title,
-            f"{number(value)} {self.unit}",
-            self.words(value),
-            min(value / end, 1.0) if np.isfinite(value) else 0.0,
-            self.good / end,
-            self.limit / end,
-            f"{self.good:.2g}",
-            number(self.limit, 0),
-            bool(value > end),
-        )
+        part = min(value / end, 1.0) if np.isfinite(value) else 0.0
+        words = self.title, f"{number(value)} {self.unit}", self.words(value)
+        marks, is_beyond = (f"{self.good:.2g}", number(self.limit, 0)), bool(value > end)
+        return Scale(*words, part, self.good / end, self.limit / end, *marks, is_beyond)
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:

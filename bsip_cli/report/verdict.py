@@ -217,11 +217,10 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
             f"(probability of the last {mass})."
         )
     ranked = sorted(cause, key=lambda one: one.effect == UNNAMED)
-    members = [
-        effect_title(one.effect)
-        + ("" if one.effect == UNNAMED else f" ({one.words.short or one.words.what})")
-        for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
-    ]
+    members = []
+    for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]:
+        size = "" if one.effect == UNNAMED else f" ({one.words.short or one.words.what})"
+        members.append(f"{effect_title(one.effect)}{size}")
     places = Counter(effect_title(one.effect) for one in ranked[len(members) :])
     others = [f"{title} ({n} places)" if n > 1 else title for title, n in places.items()]
     return (
@@ -259,9 +258,8 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
     """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those analysed."""
     names = [trial_label(stem) for stem in trials]
     if len(everywhere) > 1 and set(trials) >= set(everywhere):
-        return (
-            "in both recordings" if len(everywhere) == 2 else f"in all {len(everywhere)} recordings"
-        )
+        every = "both" if len(everywhere) == 2 else f"all {len(everywhere)}"
+        return f"in {every} recordings"
     return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -95,13 +96,9 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     uses = [m.use for m in record.members if m.use]
     used = listing([f"{name} for {uses.count(name)}" for name in dict.fromkeys(uses)], "not known")
     software = ", ".join(sorted(record.made.versions.get("bsip", ())))
-    yield Terms(
-        (
-            ("Participants", f"{len(done)} of {everyone} have identified parameters"),
-            ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)"),
-            ("Software", f"bsip {software}"),
-        )
-    )
+    people = ("Participants", f"{len(done)} of {everyone} have identified parameters")
+    use = ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)")
+    yield Terms((people, use, ("Software", f"bsip {software}")))
     yield light_of_all(record)
     yield Heading("How large are the errors?")
     yield from _strips(record)
@@ -132,18 +129,12 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(
-            Strip(title, values, names, far, one.good, one.limit, errors.ENDS_AT * one.limit)
-        )
+        end = errors.ENDS_AT * one.limit
+        drawn.append(Strip(title, values, names, far, one.good, one.limit, end))
         rows[one.name] = list(values)
-        far_out += [
-            (
-                f"{member.id} ({one.in_sentence().replace(' (COP)', '')} {number(v)} {one.unit})",
-                member,
-            )
-            for member, v, is_out in zip(members, values, far, strict=True)
-            if is_out
-        ]
+        what = one.in_sentence().replace(" (COP)", "")
+        for member, v in compress(zip(members, values, strict=True), far):
+            far_out.append((f"{member.id} ({what} {number(v)} {one.unit})", member))
     if not any(np.isfinite(strip.values).any() for strip in drawn):
         yield Paragraph("No errors are known.", "warning")
         return
@@ -180,21 +171,12 @@ def _missing(record: CohortRecord) -> list[str]:
 
 
 def _people(record: CohortRecord) -> Grid:
-    head = (
-        "participant",
-        "calibrated on",
-        "sex",
-        "use",
-        "mass [kg]",
-        "plates against it [%]",
-        "height [m]",
-        *(f"{one.title} [{one.unit}]" for one in _yardsticks(record)),
-        "identified on [s]",
-        "condition number",
-        "refusals",
-    )
+    words = ("participant", "calibrated on", "sex", "use")
+    body = ("mass [kg]", "plates against it [%]", "height [m]")
+    known = (f"{one.title} [{one.unit}]" for one in _yardsticks(record))
+    head = (*words, *body, *known, "identified on [s]", "condition number", "refusals")
     rows = tuple(_person(record, member) for member in record.members)
-    return Grid(head, rows, words=4)
+    return Grid(head, rows, words=len(words))
 
 
 def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
@@ -358,7 +340,11 @@ def light_of_all(record: CohortRecord) -> Light:
 def diagnoses_section(record: CohortRecord) -> Section:
     people = _searched_people(record)
     blocks: list[Block] = [] if people else [Paragraph(_NOT_RUN, "note")]
-    blocks += _unsearched(record)
+    missing = [m.id for m in record.members if m.facts is not None and m.searched is None]
+    if missing and people:
+        blocks.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
+    if without := [p.id for p in people if not p.was_searched]:
+        blocks.append(Paragraph(f"{_NO_TRIAL}: {named_people(without)}.", "note"))
     blocks += [Paragraph(text, "good") for text in _nothing_found(people)]
     reports = {m.id for m in record.members if m.has_report}
     rows = tuple(_cause_row(one.id, cause, reports) for one in people for cause in one.causes)
@@ -377,19 +363,6 @@ def diagnoses_section(record: CohortRecord) -> Section:
 
 def _searched_people(record: CohortRecord) -> tuple[Searched, ...]:
     return tuple(m.searched for m in record.members if m.searched is not None)
-
-
-def _unsearched(record: CohortRecord) -> list[Block]:
-    """Those of whom nothing can be said."""
-    people = _searched_people(record)
-    missing = [m.id for m in record.members if m.facts is not None and m.searched is None]
-    said: list[Block] = []
-    if missing and people:
-        said.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
-    without = [p.id for p in people if not p.was_searched]
-    if without:
-        said.append(Paragraph(f"{_NO_TRIAL}: {named_people(without)}.", "note"))
-    return said
 
 
 def _nothing_found(people: Sequence[Searched]) -> list[str]:

@@ -145,11 +145,8 @@ Cause = tuple[Candidate, ...]  # a single candidate, or all of a group of which 
 
 @dataclass(frozen=True)
 class Searched:
-    """What was found of one participant.
-
-    trials : stems of those that were searched.
-    was_searched : whether anything can be said at all.
-    """
+    """What was found of one participant; stems of the ``trials`` that were searched, and whether
+    anything can be said at all."""
 
     id: str
     causes: tuple[Cause, ...]
@@ -160,12 +157,8 @@ class Searched:
 def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]) -> Searched:
     """From a person's artifact ``diagnosis``, which is empty where no trial could be searched, and
     its facts."""
-    return Searched(
-        participant,
-        causes_of(candidates_of(diagnosis)),
-        tuple(facts.get("trials", ())),
-        not diagnosis.empty,
-    )
+    causes, trials = causes_of(candidates_of(diagnosis)), tuple(facts.get("trials", ()))
+    return Searched(participant, causes, trials, not diagnosis.empty)
 
 
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
@@ -202,7 +195,14 @@ def _found(people: Sequence[Searched]) -> list[_Found]:
 def _in_words(found: _Found, people: Sequence[Searched]) -> str:
     unsure = [person for person in found.people if person not in found.named_of]
     possibly = "possibly " if not found.named_of else ""
-    asked = _asked(found, people)
+    # how many could have shown it: a recording of the same task was searched; of quiet stance,
+    # which is no search, everybody counts
+    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
+    of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
+    asked = len(of_each)
+    if not tasks.isdisjoint(set().union(*of_each.values())):
+        could = (not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
+        asked = sum(could)
     where = f"{possibly}in {len(found.people)} of {asked} participants"
     if len(found.people) < asked:
         where += f" ({named_people(list(found.people))})"
@@ -212,16 +212,6 @@ def _in_words(found: _Found, people: Sequence[Searched]) -> str:
         return f"{text}."
     which = "all of them" if len(unsure) == len(found.people) else named_people(unsure)
     return f"{text}; one of several that look alike in {which}."
-
-
-def _asked(found: _Found, people: Sequence[Searched]) -> int:
-    """How many could have shown it: a recording of the same task was searched. Of quiet stance, which is
-    no search, everybody counts."""
-    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
-    of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
-    if tasks.isdisjoint(set().union(*of_each.values())):
-        return len(of_each)
-    return sum(not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:

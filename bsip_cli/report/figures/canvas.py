@@ -93,17 +93,9 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     """A legend in one row over the axes, where no curve runs; each label once."""
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
-    axes.legend(
-        once.values(),
-        once.keys(),
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        fontsize=8,
-        borderaxespad=0.2,
-        handlelength=2.4,
-    )
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    where |= {"frameon": False, "fontsize": 8, "borderaxespad": 0.2, "handlelength": 2.4}
+    axes.legend(once.values(), once.keys(), ncols=columns, **where)
 
 
 def plain(text: str, longest: int = LONGEST_LABEL) -> str:

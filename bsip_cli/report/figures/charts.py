@@ -46,15 +46,9 @@ def error_bars(bars: Sequence[Bar], first: Sequence[Piece] = ()) -> Figure:
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
     canvas.tidy(axes, grid="x")
-    figure.legend(
-        list(handles.values()),
-        list(handles),
-        loc="outside upper center",
-        ncols=2,
-        frameon=False,
-        fontsize=7.5,
-        handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
-    )
+    how: dict[str, Any] = {"handler_map": {tuple: HandlerTuple(ndivide=None, pad=0.0)}}
+    how |= {"loc": "outside upper center", "ncols": 2, "frameon": False, "fontsize": 7.5}
+    figure.legend(list(handles.values()), list(handles), **how)
     return figure
 
 
@@ -80,9 +74,8 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
     """A bar per marker; the line is the limit."""
     figure = canvas.new_figure(52)
     axes = figure.add_subplot()
-    axes.bar(
-        range(len(markers)), rms_mm, color=np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
-    )
+    colours = np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
+    axes.bar(range(len(markers)), rms_mm, color=colours)
     axes.axhline(limit_mm, color=canvas.INK, lw=0.9, ls="--")
     axes.set_xticks(range(len(markers)), [canvas.plain(name) for name in markers], rotation=90)
     axes.set_xlim(-0.6, len(markers) - 0.4)
@@ -173,16 +166,11 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
     axes.axhline(strip.limit, color="#b30000", lw=1.2)
     colours = np.where(strip.far[known], canvas.ORANGE, canvas.BLUE)
     many = len(known) > canvas.MANY_PEOPLE
+    style: dict[str, Any] = {"s": 8 if many else 22, "rasterized": many}
     beyond = strip.values[known] > strip.end
     for marker, mine, most in (("o", ~beyond, strip.end), ("^", beyond, 0.98 * strip.end)):
-        axes.scatter(
-            offsets[mine],
-            np.minimum(strip.values[known][mine], most),
-            s=8 if many else 22,
-            c=colours[mine],
-            marker=marker,
-            rasterized=many,
-        )
+        values = np.minimum(strip.values[known][mine], most)
+        axes.scatter(offsets[mine], values, c=colours[mine], marker=marker, **style)
     for x, k in zip(offsets, known, strict=True):
         if strip.far[k]:
             value, name = float(strip.values[k]), canvas.plain(strip.names[k])
@@ -229,18 +217,9 @@ def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
     line, people = canvas.line_of(method), len(ratios)
     many = people > canvas.MANY_PEOPLE
     offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
-    axes.scatter(
-        ratios,
-        row + offsets,
-        s=6 if many else 24,
-        lw=0.0 if many else 0.5,
-        rasterized=many,
-        edgecolor="white",
-        marker=line.marker,
-        color=line.colour,
-        label=method,
-        zorder=2,
-    )
+    style: dict[str, Any] = {"marker": line.marker, "color": line.colour, "edgecolor": "white"}
+    style |= {"s": 6, "lw": 0.0} if many else {"s": 24, "lw": 0.5}
+    axes.scatter(ratios, row + offsets, rasterized=many, label=method, zorder=2, **style)
     if np.isfinite(ratios).any():
         mean = float(np.exp(np.nanmean(np.log(ratios))))
         axes.plot([mean, mean], [row - 0.38, row + 0.38], color=line.colour, lw=1.8, zorder=3)

@@ -148,20 +148,11 @@ def poses_of(
     times = rows["time_s"].to_numpy()
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
     force, point = _forces(reconstruction, times, axes, ground)
+    ends = np.stack([start, end], axis=2)
+    each = zip(times.tolist(), ends, heads, markers, point, force, strict=True)
     return tuple(
-        Pose(
-            float(times[k]),
-            np.stack([start[k], end[k]], axis=1),
-            sides,
-            heads[k],
-            _HEAD_RADIUS_M,
-            markers[k],
-            point[k],
-            force[k],
-            ground,
-            body_weight_N,
-        )
-        for k in range(len(times))
+        Pose(time_s, two, sides, centre, _HEAD_RADIUS_M, seen, at, measured, ground, body_weight_N)
+        for time_s, two, centre, seen, at, measured in each
     )
 
 

@@ -190,11 +190,8 @@ def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
         return
     yield Paragraph(str(choice["sentence"].iloc[0]))
     for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
-        yield Paragraph(
-            f"Do not use {row.method}: a body like this is rarer than 1 in 100 people, most by "
-            f"{row.farthest}.",
-            "warning",
-        )
+        why = f"a body like this is rarer than 1 in 100 people, most by {row.farthest}"
+        yield Paragraph(f"Do not use {row.method}: {why}.", "warning")
     if choice["trials"].iloc[0]:
         head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
         rows = tuple(
@@ -217,22 +214,14 @@ def _ratio(row: Mapping, name: str) -> str:
 def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     rm, om = record.method(RM), record.method(OM)
     if om.empty or rm.empty:
-        gone = OM if om.empty else RM
-        yield Paragraph(
-            f"There are no parameters of {gone}, so nothing can be compared.", "warning"
-        )
+        missing = f"There are no parameters of {OM if om.empty else RM}"
+        yield Paragraph(f"{missing}, so nothing can be compared.", "warning")
         return
     om = om.reindex(rm.index)
-    shown = pd.DataFrame(
-        {
-            "rm_kg": rm["mass_kg"],
-            "rm_mass_kg": record.method(RM_MASS)["mass_kg"].reindex(rm.index),
-            "om_kg": om["mass_kg"],
-            "om_sd_kg": om["mass_kg_sd"],
-            "data_share": om["mass_data_share"],
-        },
-        dtype=float,
-    )
+    scaled = record.method(RM_MASS)["mass_kg"].reindex(rm.index)
+    masses = {"rm_kg": rm["mass_kg"], "rm_mass_kg": scaled, "om_kg": om["mass_kg"]}
+    masses |= {"om_sd_kg": om["mass_kg_sd"], "data_share": om["mass_data_share"]}
+    shown = pd.DataFrame(masses, dtype=float)
     labelled = shown.rename(index=segment_label)
     numbers = shown.rename_axis("segment").reset_index()
     yield picture("masses", segment_masses(labelled), numbers)
@@ -357,12 +346,12 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
         if len(hidden) == len(sizes):
             never.append(effect_words.effect_title(effect))
         elif hidden and effect in _BY_PART:
-            places = (
-                (effect_words.place_label(effect, at), effect_words.parameter_label(effect, one))
-                for at, one in hidden
-            )
-            words = "; ".join(", ".join(filter(None, part)) for part in places)
-            never.append(f"{effect_words.effect_title(effect)} ({words})")
+            words = []
+            for at, one in hidden:
+                place = effect_words.place_label(effect, at)
+                of_it = effect_words.parameter_label(effect, one)
+                words.append(", ".join(filter(None, (place, of_it))))
+            never.append(f"{effect_words.effect_title(effect)} ({'; '.join(words)})")
     if not never:
         return []
     return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]

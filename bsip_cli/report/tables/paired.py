@@ -143,27 +143,17 @@ def segment_mass(results: model.Results, criteria: Criteria) -> model.Table:
         own: dict[str, model.Cell] = {"segment": topic.variable, "mass_data_share": share.mean_a}
         return own | {"mass_data_share_sd": share.sd_a}, ""
 
-    return _paired(
-        "table1_segment_mass",
-        tests,
-        (
-            (
-                model.Column(("segment",), "Segment", segment_label, text=True),
-                model.column("n", "paired_t.n"),
-                *means(),
-            ),
-            (
-                model.column("equivalence_bound", "tost.bound", in_row_unit=True),
-                model.column("equivalence_t", "tost.statistic"),
-                model.column("equivalence_p", "tost.p_value", "equivalence p", model.p_value),
-                model.Column(("mass_data_share",), "data share", model.number(2)),
-                model.Column(("mass_data_share_sd",)),
-            ),
-        ),
-        {topic: segment_label(topic.variable) for topic in segments},
-        row,
-        (results, criteria),
+    segment = model.Column(("segment",), "Segment", segment_label, text=True)
+    after = (
+        model.column("equivalence_bound", "tost.bound", in_row_unit=True),
+        model.column("equivalence_t", "tost.statistic"),
+        model.column("equivalence_p", "tost.p_value", "equivalence p", model.p_value),
+        model.Column(("mass_data_share",), "data share", model.number(2)),
+        model.Column(("mass_data_share_sd",)),
     )
+    columns = (segment, model.column("n", "paired_t.n"), *means()), after
+    named, given = {one: segment_label(one.variable) for one in segments}, (results, criteria)
+    return _paired("table1_segment_mass", tests, columns, named, row, given)
 
 
 def cop_rmse(results: model.Results, criteria: Criteria) -> model.Table:
@@ -171,14 +161,13 @@ def cop_rmse(results: model.Results, criteria: Criteria) -> model.Table:
     tests = [results.find(topic, "paired_t") for topic in results.topics]
     differ = len({test.n for test in tests}) > 1
     axis = model.Column(("axis",), "RMSE", _AXES.__getitem__, text=True)
-    return _paired(
-        "table2_cop_rmse",
-        tests,
-        ((axis, *[_N] * differ, *means()), tuple(smaller_error())),
-        {topic: _AXES[topic.variable] for topic in results.topics},
-        lambda topic: ({"axis": topic.variable}, ""),
-        (results, criteria),
-    )
+    columns = (axis, *[_N] * differ, *means()), tuple(smaller_error())
+    named, given = {topic: _AXES[topic.variable] for topic in results.topics}, (results, criteria)
+
+    def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
+        return {"axis": topic.variable}, ""
+
+    return _paired("table2_cop_rmse", tests, columns, named, row, given)
 
 
 def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
@@ -197,14 +186,9 @@ def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
 
     label = model.Column(("label",), "Movement", text=True)
     place = [model.Column((name,)) for name in ("quantity", "task", "role")]
-    return _paired(
-        "table4_cross_validation",
-        tests,
-        ((*place, label, _N, *means()), tuple(smaller_error())),
-        {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics},
-        row,
-        (results, criteria),
-    )
+    columns = (*place, label, _N, *means()), tuple(smaller_error())
+    named = {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics}
+    return _paired("table4_cross_validation", tests, columns, named, row, (results, criteria))
 
 
 def centres_of_mass(results: model.Results, criteria: Criteria) -> model.Table:
@@ -233,15 +217,9 @@ def centres_of_mass(results: model.Results, criteria: Criteria) -> model.Table:
     both = "description.mean_a description.sd_a"
     apart = "apart_mean apart_sd", both, "|OM - RM| M(SD)", model.mean_sd(2), (DIFFERENCE, ""), True
     label = model.Column(("label",), "Quantity", text=True)
-    return _paired(
-        "table6_centres_of_mass",
-        tests,
-        ((model.Column(("variable",)), label, _N, *means(), model.column(*apart)), ()),
-        named,
-        row,
-        (results, criteria),
-        in_print="; ".join(_in_print()),
-    )
+    columns = (model.Column(("variable",)), label, _N, *means(), model.column(*apart)), ()
+    name, printed, given = "table6_centres_of_mass", "; ".join(_in_print()), (results, criteria)
+    return _paired(name, tests, columns, named, row, given, in_print=printed)
 
 
 def _in_print() -> Iterator[str]:

@@ -119,7 +119,6 @@ def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]
 
 
 def _named(unit: Unit, option: str, given: str) -> list[Trial]:
-    """The recordings of these tasks, or of these names: squat, or squat_run-2."""
     trials, found = unit.person.trials, []
     for name in given.split(",") if given else ():
         fits = [t for t in trials if name in (t.task, t.stem, t.stem.split("_task-")[1])]
@@ -136,7 +135,6 @@ def _named(unit: Unit, option: str, given: str) -> list[Trial]:
 
 
 def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Trial]) -> None:
-    """There are recordings, all with motion and forces, and all carry the same."""
     if not trials:
         raise UsageError(
             f"no recording {option.removeprefix('--')} a declared load has motion and forces",

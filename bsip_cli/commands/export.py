@@ -208,7 +208,6 @@ def export_session(
 
 
 def _check(request: Request) -> None:
-    """Options that belong together."""
     of_models = request.formats or request.model_file or request.model_bodies
     of_bodies = of_models or request.method or request.repair
     if request.what in ("recording", "bids") and request.to is None:
@@ -224,7 +223,6 @@ def _check(request: Request) -> None:
 
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
-    """Ending of the file and who writes it, for every format that is asked for."""
     formats = dict.fromkeys(request.formats or FORMATS)
     writers: dict[str, Writer] = {
         FORMATS[name][0]: partial(lambda text_of, body: (text_of(body), ""), FORMATS[name][1])
@@ -350,7 +348,6 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
 
 
 def _in_order(unit: Unit, kind: str, rows: pd.DataFrame, segments: tuple[str, ...]) -> pd.DataFrame:
-    """Rows in the order of these segments of the skeleton."""
     if sorted(rows["segment"]) != sorted(segments):
         raise BadDataError(
             "its segments are not those of the skeleton",

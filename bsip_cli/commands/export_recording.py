@@ -270,7 +270,6 @@ class _Correction:
 
     @cached_property
     def _plates(self) -> dict[str, PlateReading]:
-        """How the plates that count are understood."""
         names = [source.name for source in self._opened.sources]
         found = {name: self._session.plates.get(name, Verdict()) for name in names}
         return {n: one.reading for n, one in found.items() if not (one.refusal or one.repeats)}

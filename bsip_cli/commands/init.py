@@ -115,7 +115,6 @@ def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> Stu
 
 
 def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
-    """A first set of all labels, those of static trials first."""
     order = sorted(sources, key=lambda source: named[source.path].task != "static")
     labels = dict.fromkeys(label for source in order for label in source.written)
     try:
@@ -280,7 +279,6 @@ def _write(plan: _Plan) -> None:
 
 
 def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
-    """Each file that is used, where it goes in the study, and what it is of."""
     for source in plan.sources:
         named = plan.named[source.path]
         for path in filter(None, (source.path, source.forces)):

@@ -126,7 +126,6 @@ def _why(refusal: BadDataError) -> str:
 
 
 def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unused:
-    """Why a file that is no recording is left where it is."""
     inner = Path(one.path.stem.removesuffix(".tar")).suffix.lower()
     if one.kind in PACKED and inner in (*RECORDINGS, *ENDINGS):
         return Unused(one.path, "is packed: unpack it", is_fault=True)
@@ -180,7 +179,6 @@ def trial_words(path: Path) -> tuple[str, ...]:
 
 
 def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Source:
-    """Read a recording as it will lie in the study."""
     forces = None
     if one.kind == ".trc":
         # tables of its name, from the nearest folder that has one, which no other TRC has

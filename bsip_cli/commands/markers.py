@@ -84,7 +84,6 @@ def _say(lines: Sequence[str]) -> None:
 
 
 def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess | None, MarkerSet]:
-    """The set that was named, else the one that the labels fit; says which."""
     if marker_set != "auto":
         chosen = load_marker_set(marker_set)
         _say(["", f"marker set: {chosen.name} ({chosen.description}), as asked"])

@@ -76,7 +76,6 @@ class _Results:
 
     @cached_property
     def _made(self) -> list[Mapping[str, Any]]:
-        """Who made the artifacts, one of each kind and person or trial."""
         kinds = (*_WITH_OPTIONS, *_LATER)
         files = (path for kind in kinds for path in self._files(kind))
         return [read_header(path)["provenance"]["made_by"] for path in files]

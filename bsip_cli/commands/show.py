@@ -93,7 +93,6 @@ def _folders(out: Path) -> list[Path]:
 
 
 def _notes(out: Path, kind: str, *columns: str) -> Iterator[str]:
-    """What an artifact says of each person, if anything."""
     for folder in _folders(out):
         try:
             table = _table(folder, kind)
@@ -105,7 +104,6 @@ def _notes(out: Path, kind: str, *columns: str) -> Iterator[str]:
 
 
 def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | None:
-    """What was searched in a participant's recordings and what came out, in words."""
     diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
     if diagnosis is None or detection is None:
         return None
@@ -167,7 +165,6 @@ def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], str]:
 
 
 def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:
-    """Stems of the trials and their artifacts of a kind."""
     ending = f"_{SCHEMAS[kind].file_name}.parquet"
     paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
     return [(path.name.removesuffix(ending), read_artifact(path, kind)) for path in paths]

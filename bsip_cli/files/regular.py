@@ -185,7 +185,6 @@ def _text(file: Path) -> tuple[str, str]:
 
 
 def _header(line: str, known: Callable[[Sequence[str]], int]) -> tuple[tuple[str, ...], str]:
-    """The cells of the first line, and what separates them; tabs where nothing says otherwise."""
     best: tuple[int, tuple[str, ...], str] = (-1, (), "tabs")
     for separator in (*_SEPARATORS.values(), *_BLANKS):
         try:

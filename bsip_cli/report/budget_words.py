@@ -128,7 +128,6 @@ def _unknown(parts: Sequence[tuple[str, float]]) -> Iterator[Piece]:
 
 
 def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
-    """Terms that stand in for each other are one group."""
     left = [term for term in rows.index if term != "total"]
     while left:
         group = [left[0]]

@@ -171,7 +171,6 @@ def separating_recording(causes: Sequence[tuple[str, str]], most: int | None = N
 
 
 def _places(effect: str, causes: Sequence[tuple[str, str]]) -> str:
-    """The same effect at several places: they have to move, or be loaded, one at a time."""
     where = listing([place_label(effect, target) for name, target in causes if name == effect])
     if effect in _LOADS:
         return f"look for what is worn or loose there, or keep still but for one at a time: {where}"

@@ -80,7 +80,6 @@ def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
 
 
 def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator[blocks.Block]:
-    """At most three things; all others are below."""
     said = to_do(record, light, most)
     yield blocks.Heading("What to do next")
     yield blocks.Bullets(tuple(said[:_MOST_TO_DO]))
@@ -205,7 +204,6 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
 
 
 def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
-    """Those of which the page says all."""
     return record.causes[: most - len(large_finding(record))]
 
 

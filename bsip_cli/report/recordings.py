@@ -229,7 +229,6 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
 
 
 def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
-    """``all recordings``, their names, or how many of each task."""
     if len(stems) == len(names):
         return "all recordings"
     items: list[str] = []

@@ -208,7 +208,6 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
-    """What all say is said once."""
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))
         either = ", ".join(one.words.short for one in cause)
@@ -264,7 +263,6 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
 
 
 def _how_sure(cause: Sequence[Candidate]) -> str:
-    """How probable it is, and what it explains of data that were not used to size it."""
     words = probability_words(probability_of(cause))
     if words:
         rest = ", else the stated mass is wrong" if cause[0].class_id == OF_THE_WEIGHT else ""

@@ -77,7 +77,6 @@ def units_of(
 
 @lru_cache(maxsize=64)
 def _before(stage: Stage) -> tuple[Stage, ...]:
-    """The stages whose results a stage reads, directly or not, in order."""
     found: set[str] = set()
     waiting = list(stage.inputs)
     while waiting:
@@ -126,7 +125,6 @@ def _differs(known: Mapping | None, wanted: Mapping) -> str:
 
 
 def _names(one: Mapping, other: Mapping) -> list[str]:
-    """Keys under which two mappings differ."""
     return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
 
 

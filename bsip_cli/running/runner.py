@@ -114,7 +114,6 @@ def run_stages(
 
 
 def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]]:
-    """Whose, and what; the end of a process stops nobody else's work."""
     for result in work_on(tasks, _run, jobs, _tidy):
         if isinstance(result, Died):
             task, code = result.task, result.exit_code or 0
@@ -134,7 +133,6 @@ def _tidy(task: _Task) -> None:
 
 
 def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
-    """The stages of a task, unless another bsip is at them."""
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):

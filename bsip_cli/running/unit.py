@@ -362,7 +362,6 @@ def imported_by(module: str) -> frozenset[str]:
 
 @lru_cache(maxsize=1024)
 def _named_in(module: str) -> frozenset[str]:
-    """Modules, and what else may be one, that a module's text names in imports."""
     text = _source(module) or ""
     named = set(_IMPORT.findall(text))
     for package, names in _FROM.findall(text):
@@ -380,7 +379,6 @@ def _place_of(module: str) -> Path:
 
 @lru_cache(maxsize=1024)
 def _source(module: str) -> str | None:
-    """Its text; None where there is no such module."""
     place = _place_of(module)
     files = (file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file())
     return next((file.read_text(encoding="utf-8") for file in files), None)

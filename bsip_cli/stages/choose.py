@@ -96,7 +96,6 @@ def _use(movement: str, use: dict[str, str]) -> str:
 def _why(
     use: str, differences: choice.Differences, judges: list[Judge], data: str, is_rare: bool
 ) -> str:
-    """Ground forces in newtons, then what decided."""
     if not judges:
         return "no trial is left to judge by, so the table's parameters stand."
     where = _WHERE[data].format(trials=count(len(judges), "trial"))
@@ -153,7 +152,6 @@ def _judges(unit: Unit) -> tuple[list[Judge], str]:
 
 
 def _judge(unit: Unit, trial: Trial) -> Judge | None:
-    """None where no held-out frame of a trial compares all methods."""
     fit = unit.read("fit", trial)
     held_out = fit[(fit["data"] == "held_out") & fit["method"].isin(METHODS)]
     errors = held_out.pivot(index="component", columns="method", values="rmse")
@@ -184,7 +182,6 @@ def _within(
 
 
 def _differences(judges: list[Judge]) -> choice.Differences:
-    """In one movement."""
     if len(judges) == 1:
         return {pair: judges[0].alone(pair) for pair in choice.PAIRS}
     return {

@@ -70,7 +70,6 @@ def run_person(unit: Unit) -> None:
 def _extended(
     unit: Unit, person: Person, bsip: pd.DataFrame, causes: tuple[Cause, ...], trials: list[Trial]
 ) -> pd.DataFrame:
-    """Rows of ``bsip`` per number of causes in the model."""
     methods, parameters = reconstruct.parameters_of(bsip, person)
     phi = body_as_sized(unit, parameters[:, methods.index(RM)])
     concerned = {stem for cause in causes for stem in cause.trials}
@@ -207,7 +206,6 @@ def run_trial(unit: Unit) -> None:
 def _errors(
     judgement: reconstruct.Judgement, signals: reconstruct.Signals, method: str, blocks: Blocks
 ) -> dict[str, BlockErrors]:
-    """Per component, in the units that people read."""
     judged, errors = judgement.judged, {}
     numbers = blocks.of(judgement.times_s)[judged]
     for component in signals[MEASURED]:

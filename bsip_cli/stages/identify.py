@@ -93,7 +93,6 @@ def run(unit: Unit) -> None:
 def _write_table_only(
     unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
 ) -> None:
-    """Without forces that belong to the motion the table's values stand alone."""
     unit.say(
         f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"

@@ -246,7 +246,6 @@ def _rows_of(
     counts: tuple[int, int],
     cells: Mapping[str, str],
 ) -> Iterator[dict]:
-    """One for each number of a cause; counts : persons and trials that show it."""
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
     for x in found.sizes:

@@ -187,7 +187,6 @@ def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
 
 
 def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
-    """A participant's table; empty where there is none."""
     there = unit.path(kind, participant=participant).exists()
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 

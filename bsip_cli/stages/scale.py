@@ -126,7 +126,6 @@ def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
 
 
 def _warn_strangers(unit: Unit, marker_set: MarkerSet, recorded: list[_Recorded]) -> None:
-    """Of trials whose labels were taken for other markers than the calibrating trial's."""
     known = {marker.label for marker in marker_set.markers}
     for one in recorded:
         strange = [label for label in one.labels if label not in known]
@@ -175,7 +174,6 @@ def _unrest(one: _Recorded) -> tuple[float, slice]:
 
 
 def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
-    """Label to mean position over the frames in which the marker is visible."""
     tracks = zip(one.labels, one.positions[frames].swapaxes(0, 1), strict=True)
     seen = {label: track[np.isfinite(track[:, 0])] for label, track in tracks}
     return {label: places.mean(axis=0) for label, places in seen.items() if len(places)}

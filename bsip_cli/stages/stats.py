@@ -201,7 +201,6 @@ class Recording:
 
 
 def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
-    """The rows of these methods as plain dictionaries."""
     return frame[frame["method"].isin(methods)].to_dict("records")  # type: ignore[return-value]
 
 

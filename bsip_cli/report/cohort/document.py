@@ -291,7 +291,6 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
 
 
 def _one_number(ratios: Ratios) -> Iterator[Block]:
-    """What one number for the whole mass does without identification."""
     name = "grf_vertical"
     if name in ratios.of_component:
         rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
@@ -366,7 +365,6 @@ def _searched_people(record: CohortRecord) -> tuple[Searched, ...]:
 
 
 def _nothing_found(people: Sequence[Searched]) -> list[str]:
-    """Those of the same movements together."""
     of_movements: dict[str, list[str]] = {}
     for one in people:
         if one.was_searched and not one.causes:

@@ -71,7 +71,6 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
 
 
 def _named(row: Mapping[Any, Any]) -> str:
-    """A fault and, where there is a choice, its place."""
     title, place = effect_title(row["effect"]), place_label(row["effect"], row["target"])
     return f"{title} ({place})" if place else title
 
@@ -104,7 +103,6 @@ _SHOWN = {
 
 
 def _limits(rows: pd.DataFrame) -> Iterator[str]:
-    """The smallest limit of each fault that the sentence mentions."""
     for (effect, parameter), words in _SHOWN.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
         for best in mine.sort_values("limit").head(1).to_dict("records"):

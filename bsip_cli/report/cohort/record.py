@@ -215,7 +215,6 @@ def _in_words(found: _Found, people: Sequence[Searched]) -> str:
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:
-    """From the least to the largest, and whether they are equal within their intervals."""
     known = [n for n in numbers if n is not None]
     if len(known) < len(numbers) or len({n.name for n in known}) > 1:
         return ""

@@ -86,7 +86,6 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
 
 
 def _ticks(axes: Axes, low: float, high: float) -> None:
-    """Of a logarithmic axis."""
     axes.set_xlim(low, high)
     ticks = [t for t in _TICKS if low <= t <= high]
     axes.xaxis.set_major_locator(FixedLocator(ticks))

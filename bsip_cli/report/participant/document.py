@@ -108,7 +108,6 @@ def _trials(record: records.ParticipantRecord) -> Grid:
 
 
 def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
-    """What the person carried as the study says, and what was made of it."""
     trials_of: dict[str, list[str]] = {}
     for trial, words in record.loads:
         trials_of.setdefault(words, []).append(trial)
@@ -184,7 +183,6 @@ _MOST_STEPS = 3
 
 
 def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
-    """Nothing where ``choose`` has not run."""
     choice = record.choice
     if choice is None or choice.empty:
         return
@@ -251,7 +249,6 @@ def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
 
 
 def _next(record: records.ParticipantRecord) -> Iterator[Block]:
-    """What to record to know more."""
     table = record.excitation
     if table.empty:
         yield Paragraph("How well the movement excites the parameters was not computed.", "note")
@@ -360,7 +357,6 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
 def _limit_rows(
     effect: str, together: Sequence[Limit], alone: Sequence[Limit]
 ) -> Iterator[tuple[str, ...]]:
-    """A row per unit: the range over all places and directions."""
     lasting = [x for x in together if x.effect == effect and x.trials > 1]
     single = [x for x in alone if x.effect == effect]
     usual = effect_words.USUAL[effect]

@@ -88,7 +88,6 @@ def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice
 
 
 def _budget(record: ParticipantRecord) -> Iterator[Block]:
-    """Component by component, all recordings together."""
     if record.budget is None or record.budget.empty:
         return
     found = effects_in(record.causes)
@@ -138,7 +137,6 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def _cell(gain: errors.Gain | None, method: str) -> Cell:
-    """The error, marked where it is smaller than those of all others."""
     if gain is None:
         return Cell(number(None))
     own = gain.of.get(method, np.nan)
@@ -147,7 +145,6 @@ def _cell(gain: errors.Gain | None, method: str) -> Cell:
 
 
 def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator[Block]:
-    """What one number for the whole mass is, and does without identification."""
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
     mean = {one.component: one for one in errors.pooled_gains(held_out)}.get("grf_vertical")

@@ -151,7 +151,6 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
 
 
 def _errors_of_six() -> Iterator[Column]:
-    """Tests of the RMSE, of OM against each other method."""
     for one in paired.smaller_error("n_paired", "sign.n"):
         yield one
         name, pair = one.fields[0], one.of[0][2:]
@@ -174,7 +173,6 @@ def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell
 
 
 def _sibling(topic: Topic, measure: str) -> Topic:
-    """The same component and task, another measure."""
     return Topic(topic.table, topic.variable[:3] + measure, topic.task, topic.role, "1")
 
 

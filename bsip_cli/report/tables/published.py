@@ -88,13 +88,11 @@ def next_to_published(tag: str, results: Results) -> Table:
 
 
 def _here(method: str, of: str = "") -> tuple[str, str]:
-    """Names of the CSV columns of mean and standard deviation."""
     name = method.lower().replace(" ", "_").replace("+", "_")
     return f"{name}{of}_mean", f"{name}{of}_sd"
 
 
 def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
-    """This study's n, means and standard deviations by the paper's names of the methods."""
     topic = _topic(results, row)
     if topic is None:
         return {}

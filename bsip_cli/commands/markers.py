@@ -49,13 +49,9 @@ def _compared(recording: Recording, chosen: MarkerSet, prefix: str) -> bool:
     """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
     labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, prefix)
     _say([finding.sentence() for finding in paired])
-    match = match_labels(
-        labels,
-        chosen.wanted(),
-        optional=chosen.optional(),
-        seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
-        prefix=prefix,
-    )
+    seen = np.isfinite(recording.markers_m[..., 0]).any(axis=0)
+    how = {"optional": chosen.optional(), "seen": seen, "prefix": prefix}
+    match = match_labels(labels, chosen.wanted(), **how)
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
     words = {}
     for k, marker in there.items():

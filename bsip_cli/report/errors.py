@@ -71,13 +71,10 @@ def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
     for name in COMPONENTS:
         if mine := [gain for gain in known if gain.component == name]:
             frames = [gain.frames for gain in mine]
-            errors = {
-                method: float(
-                    np.sqrt(np.average([g.of[method] ** 2 for g in mine], weights=frames))
-                )
-                for method in METHODS
-                if all(method in gain.of for gain in mine)
-            }
+            methods = [m for m in METHODS if all(m in gain.of for gain in mine)]
+            squares = {m: [gain.of[m] ** 2 for gain in mine] for m in methods}
+            means = {m: np.average(each, weights=frames) for m, each in squares.items()}
+            errors = {m: float(np.sqrt(mean)) for m, mean in means.items()}
             pooled.append(Errors(name, mine[0].unit, errors))
     return tuple(pooled)
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -59,13 +58,8 @@ class Known:
                 own = self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
                 closing = interval_words(numbers) + known + _own_words(own, rows)
                 what = effect.name, str(target), tuple(one.name for one in held), numbers, words
-                more: dict[str, Any] = {
-                    "scope": "laboratory",
-                    "persons": persons,
-                    "own": own,
-                    "closing": closing,
-                }
-                yield Finding(*what, 1 - probability, probability, **more)
+                sure, of = (1 - probability, probability), "laboratory"
+                yield Finding(*what, *sure, scope=of, persons=persons, own=own, closing=closing)
 
     def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> Number | None:
         """A fault's largest number by this person's recordings; None where they say nothing."""
@@ -88,11 +82,10 @@ class Known:
         sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))
         for found in self.findings(trials):
             parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
-            mine = [
-                sizes.get(Coordinate(found.effect, found.target, p.name), x.value / p.typical)
-                * p.typical
-                for p, x in zip(parameters, found.numbers, strict=True)
-            ]
+            mine = []
+            for p, x in zip(parameters, found.numbers, strict=True):
+                at = Coordinate(found.effect, found.target, p.name)
+                mine.append(sizes.get(at, x.value / p.typical) * p.typical)
             yield cause_record(found.effect, found.target, found.trials, np.array(mine))
 
     def _given_no_other(self) -> np.ndarray:
@@ -150,13 +143,9 @@ def known_laboratory(unit: Unit) -> Known | None:
     table = unit.read("laboratory", laboratory=[number], scope=["laboratory"])
     covariance = posterior.covariance[np.ix_(at, at)]
     values, vectors = np.linalg.eigh(covariance)
-    return Known(
-        tuple(pooled.coordinates[k] for k in at),
-        posterior.mean[at],
-        vectors * np.sqrt(np.maximum(values, 0.0)),
-        table,
-        alone(sessions),
-    )
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    coordinates = tuple(pooled.coordinates[k] for k in at)
+    return Known(coordinates, posterior.mean[at], root, table, alone(sessions))
 
 
 def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
@@ -201,13 +190,9 @@ def information_in(rows: pd.DataFrame) -> Information:
 def pooled_in(rows: pd.DataFrame) -> Pooled:
     """Of one laboratory's rows of ``laboratory-sums``."""
     roots = rows.filter(regex=r"^root_").dropna(axis=1)
-    return Pooled(
-        coordinates_in(rows),
-        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
-        rows["pull"].to_numpy(),
-        rows["spread"].to_numpy(),
-        roots.to_numpy(),
-    )
+    precision = rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy()
+    pull, spread = rows["pull"].to_numpy(), rows["spread"].to_numpy()
+    return Pooled(coordinates_in(rows), precision, pull, spread, roots.to_numpy())
 
 
 def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:

@@ -73,27 +73,20 @@ def run_person(unit: Unit) -> None:
                 "moments_s": [float(moments.mean()), float(moments.std())],
             }
     if not sessions:
-        unit.warn(
-            f"{unit.name}: no trial has motion with every contact on a plate; it shows nothing of "
-            "the laboratory"
-        )
+        why = "no trial has motion with every contact on a plate"
+        unit.say(f"{why}; it shows nothing of the laboratory")
     facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
     unit.write("laboratory-information", rows, facts)
 
 
 def _session_rows(session: str, information: Information) -> list[dict]:
     numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
-    return [
-        {
-            "session": session,
-            **vars(one),
-            **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
-            "trials": int(trials),
-            "pull": information.pull[k],
-            **{f"precision_{j}": x for j, x in enumerate(information.precision[k])},
-        }
-        for k, (one, parameter, trials) in enumerate(numbers)
-    ]
+    rows: list[dict] = []
+    for k, (one, parameter, trials) in enumerate(numbers):
+        row = {"session": session, **vars(one), "trials": int(trials), "pull": information.pull[k]}
+        row |= {name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")}
+        rows.append(row | {f"precision_{j}": x for j, x in enumerate(information.precision[k])})
+    return rows
 
 
 # --- all together ---------------------------------------------------------------------------------
@@ -134,12 +127,9 @@ def run(unit: Unit) -> None:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
         rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
-    facts = {
-        "persons": {
-            str(k): {s.person: s.name for s in one} for k, one in enumerate(laboratories, start=1)
-        },
-        "answer": _answer(unit, found),
-    }
+    numbered = enumerate(laboratories, start=1)
+    persons = {str(k): {s.person: s.name for s in one} for k, one in numbered}
+    facts = {"persons": persons, "answer": _answer(unit, found)}
     table = pd.DataFrame(rows, columns=column_names("laboratory"))
     for sentence in named_sentences(table):
         unit.warn(sentence)

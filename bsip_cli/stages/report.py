@@ -40,12 +40,8 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {
-        "light": asdict(light),
-        "large": large_finding(record),
-        "first": must_wait(record),
-        "use": use_now(record),
-    }
+    facts: dict = {"light": asdict(light), "large": large_finding(record)}
+    facts |= {"first": must_wait(record), "use": use_now(record)}
     unit.write("report-files", rows, facts=facts)
 
 
@@ -70,23 +66,18 @@ def record_of(unit: Unit) -> records.ParticipantRecord:
     """Everything that is there of the unit's participant."""
     usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
     trials = sorted(unit.person.trials, key=lambda trial: list(ROLES).index(trial.role))
+    person, days = unit.person.id, unit.config.laboratory.recorded_on.items()
     return records.ParticipantRecord(
-        id=unit.person.id,
+        id=person,
         facts=unit.read("person").iloc[0],
-        bsip=unit.read("bsip"),
-        excitation=unit.read("excitation"),
-        identification=unit.read("identification"),
+        **{kind: unit.read(kind) for kind in ("bsip", "excitation", "identification")},
         body=person_of(unit),
         trials=tuple(_trial_record(unit, trial, usable) for trial in trials),
         refusals=refusals_of(unit, unit.person),
         origins=tuple(_origins(unit, usable)),
         defaults=unit.shipped_options(),
         made_on=date.today().isoformat(),
-        recorded_on=tuple(
-            day
-            for name, day in unit.config.laboratory.recorded_on.items()
-            if name.partition("_ses-")[0] == unit.person.id
-        ),
+        recorded_on=tuple(day for name, day in days if name.partition("_ses-")[0] == person),
         loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),

@@ -208,15 +208,10 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
     normality = samples.lilliefors_test(np.subtract(*samples.finite_pairs(pair.x, pair.y)))
-    by_t = pair.row(
-        "paired_t",
-        pair.origin,
-        test,
-        effect_size=cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b),
-        effect_size_name=f"Cohen's d (pooled SD, {pair.other} - OM)",
-        lilliefors_p=normality.p_value,
-        reason=test.reason or normality.reason,
-    )
+    more: dict[str, Any] = {"effect_size_name": f"Cohen's d (pooled SD, {pair.other} - OM)"}
+    more["effect_size"] = cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b)
+    more |= {"lilliefors_p": normality.p_value, "reason": test.reason or normality.reason}
+    by_t = pair.row("paired_t", pair.origin, test, **more)
     d_z = samples.TestResult(n=test.n, difference=test.difference, reason=test.reason)
     d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
     ranks = wilcoxon(pair.x, pair.y)

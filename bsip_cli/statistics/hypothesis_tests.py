@@ -112,13 +112,9 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     if m > (EXACT_WITH_TIES_UP_TO if has_ties else EXACT_WILCOXON_UP_TO):
         method = "asymptotic"
     positive, negative = float(ranks[nonzero > 0].sum()), float(ranks[nonzero < 0].sum())
-    return TestResult(
-        n=n,
-        difference=estimate,
-        statistic=min(positive, negative),
-        p_value=float(stats.wilcoxon(nonzero, method=method).pvalue),
-        effect_size=(positive - negative) / (positive + negative),
-    )
+    found = TestResult(n=n, difference=estimate, statistic=min(positive, negative))
+    p = float(stats.wilcoxon(nonzero, method=method).pvalue)
+    return found.with_(p_value=p, effect_size=(positive - negative) / (positive + negative))
 
 
 def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.05) -> TestResult:
@@ -236,14 +232,9 @@ def one_way_anova(groups: Sequence[ArrayLike], alpha: float = 0.05) -> tuple[Tes
     ss_within = float(sum(np.sum((sample - sample.mean()) ** 2) for sample in samples))
     ss_total = float(np.sum((pooled - pooled.mean()) ** 2))
     df = float(len(pooled) - len(samples))
-    f, p = stats.f_oneway(*samples)
-    found = found.with_(
-        statistic=float(f),
-        df1=float(len(samples) - 1),
-        df2=df,
-        p_value=float(p),
-        effect_size=1.0 - ss_within / ss_total,
-    )
+    f, p = map(float, stats.f_oneway(*samples))
+    found = found.with_(statistic=f, df1=float(len(samples) - 1), df2=df, p_value=p)
+    found = found.with_(effect_size=1.0 - ss_within / ss_total)
     pairs, after = list(combinations(range(len(samples)), 2)), {}
     critical = float(stats.t.isf(alpha / 2.0 / len(pairs), df))
     for i, j in pairs:

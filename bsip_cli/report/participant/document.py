@@ -50,6 +50,7 @@ from bsip_cli.statistics.methods import OM, RM, RM_MASS
 def participant_document(record: records.ParticipantRecord) -> Document:
     made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
+    parameters = (*_choice(record), *_masses(record), *_next(record))
     return Document(
         title=f"{record.id}: do force plates and markers agree?",
         subtitle="",
@@ -58,11 +59,7 @@ def participant_document(record: records.ParticipantRecord) -> Document:
             diagnosis_section(record),
             errors.section(record),
             errors.joints_section(record),
-            Section(
-                "parameters",
-                "Which segment parameters come out?",
-                (*_choice(record), *_masses(record), *_next(record)),
-            ),
+            Section("parameters", "Which segment parameters come out?", parameters),
             recording_section(record),
             Section("made", "How was it made, and what can it not know?", tuple(made)),
             WORDS,

@@ -177,6 +177,24 @@ def _rounded(value: float, decimals: int) -> str:
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
+_COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
+_FORMS: dict[str, Callable[..., str]] = {
+    "number": number(2),
+    "interval": interval(2),
+    "p": p_value,
+    "counts": counts_of,
+}
+
+
+def columns(name: str, pair: tuple[str, str] = (OM, RM), **words: str) -> tuple[Column, ...]:
+    """Those of ``columns.toml`` by that name; ``words`` go into the headings."""
+    found = []
+    for fields, of, heading, form, *in_row_unit in _COLUMNS[name]:
+        how = heading.format(**words), _FORMS.get(form, str), pair
+        found.append(column(fields, of, *how, in_row_unit=bool(in_row_unit)))
+    return tuple(found)
+
+
 # --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
 
 NAMED_AT_MOST = 6  # missing participants and rows that are named one by one

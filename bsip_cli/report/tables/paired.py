@@ -27,37 +27,21 @@ _SEGMENTS += [f"{part}_{side}" for limb in _LIMBS for side in "lr" for part in l
 def means(test: str = "paired_t") -> tuple[model.Column, ...]:
     """Of the methods; ``test``: the one of OM and RM."""
     numbers = ((OM, test, "a", RM), (RM, test, "b", RM), (RM_MASS, "paired_t", "b", RM_MASS))
-    return tuple(
-        model.column(
+    found = []
+    for method, name, side, other in numbers:
+        fields, of = (
             f"{SHORT[method]}_mean {SHORT[method]}_sd",
             f"{name}.mean_{side} {name}.sd_{side}",
-            f"{method} M(SD)",
-            model.mean_sd(2),
-            (OM, other),
-            in_row_unit=True,
         )
-        for method, name, side, other in numbers
-    )
+        how = f"{method} M(SD)", model.mean_sd(2), (OM, other)
+        found.append(model.column(fields, of, *how, in_row_unit=True))
+    return tuple(found)
 
 
 def _tests(criteria: Criteria) -> tuple[model.Column, ...]:
     """Of OM against RM."""
     confidence = f"{100.0 * (1.0 - criteria.alpha):g}% CI"
-    ends = "paired_t.ci_low paired_t.ci_high"
-    return (
-        model.column("difference", "paired_t.difference", in_row_unit=True),
-        model.column("ci_low ci_high", ends, confidence, model.interval(2), in_row_unit=True),
-        model.column("t", "paired_t.statistic", "t", model.number(2)),
-        model.column("df", "paired_t.df1"),
-        model.column("p", "paired_t.p_value", _P[RM], model.p_value),
-        model.column("p_holm", "paired_t.p_holm"),
-        model.column("cohens_d_pooled", "paired_t.effect_size", "Cohen's d", model.number(2)),
-        model.column("lilliefors_p", "paired_t.lilliefors_p", "Lilliefors p", model.p_value),
-        model.column("wilcoxon_w", "wilcoxon.statistic"),
-        model.column("wilcoxon_p", "wilcoxon.p_value", "Wilcoxon p", model.p_value),
-        model.column("rank_biserial", "wilcoxon.effect_size"),
-        model.column("d_z", "d_z.effect_size", "d_z", model.number(2)),
-    )
+    return model.columns("paired", ci=confidence, p=_P[RM])
 
 
 def against_rm_mass(criteria: Criteria) -> tuple[model.Column, ...]:
@@ -144,13 +128,8 @@ def segment_mass(results: model.Results, criteria: Criteria) -> model.Table:
         return own | {"mass_data_share_sd": share.sd_a}, ""
 
     segment = model.Column(("segment",), "Segment", segment_label, text=True)
-    after = (
-        model.column("equivalence_bound", "tost.bound", in_row_unit=True),
-        model.column("equivalence_t", "tost.statistic"),
-        model.column("equivalence_p", "tost.p_value", "equivalence p", model.p_value),
-        model.Column(("mass_data_share",), "data share", model.number(2)),
-        model.Column(("mass_data_share_sd",)),
-    )
+    share = model.Column(("mass_data_share",), "data share", model.number(2))
+    after = (*model.columns("equivalence"), share, model.Column(("mass_data_share_sd",)))
     columns = (segment, model.column("n", "paired_t.n"), *means()), after
     named, given = {one: segment_label(one.variable) for one in segments}, (results, criteria)
     return _paired("table1_segment_mass", tests, columns, named, row, given)

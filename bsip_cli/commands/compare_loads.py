@@ -87,11 +87,7 @@ def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, No
 
 
 def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]:
-    """The recordings with and without: those named, or of the others that move, by what they carry.
-
-    UsageError: no load is declared that distinguishes them, a name fits no recording or both sets,
-        or the recordings of one set carry different loads.
-    """
+    """Recordings with and without: those named, or of the others that move, by what they carry."""
     ready = unit.trials("kinematics", "wrench")
     moving = [trial for trial in ready if trial.role != "static"]
     named = [_named(unit, *each) for each in zip(_OPTIONS, names, strict=True)]
@@ -211,16 +207,13 @@ _EXPECTED = Column(("expected",), "To be expected")
 
 # --- what the parameters gain by the load ---------------------------------------------------------
 
-
 _SHORTEST_S = 0.5
 _Z95 = 1.96
 
 
 def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[Trial]]) -> None:
-    """Identify from the trials with and from those without, and write the table.
-
-    ``loads_off``: the same unit without the declared loads, which stay in the forces.
-    """
+    """Identify from the trials with and from those without, and write the table. ``loads_off``: the
+    same unit without the declared loads, which stay in the forces."""
     person = person_of(unit)
     skeleton = person.skeleton
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])

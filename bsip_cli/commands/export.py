@@ -38,7 +38,6 @@ from bsip_cli.study.study import describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
-
 # Of a trial: names of files with their content, and what else the user should know.
 Texts = tuple[dict[str, str], str]
 # Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.

@@ -122,10 +122,7 @@ def _corrected(unit: Unit, folder: Path) -> Outcome:
 
 
 class _Correction:
-    """What is done to one recording.
-
-    ``said`` : what is corrected, a sentence each. ``left`` : what is not, and why.
-    """
+    """What is done to a recording. ``said``: what is corrected; ``left``: what is not, and why."""
 
     def __init__(self, unit: Unit) -> None:
         self.unit, self.left = unit, list[str]()
@@ -329,11 +326,9 @@ class _Correction:
     # --- axes and labels ------------------------------------------------------------------------
 
     def _turns(self, *, markers: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes.
-
-        Where the vertical is tilted both are turned, about the middle of the plates, lest the
-        surfaces, whose places in the file stay, come to lie under or over what stands on them.
-        """
+        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes:
+        where the vertical is tilted both, about the middle of the plates, lest the surfaces, whose
+        places in the file stay, come to lie under or over what stands on them."""
         for cause in self.causes:
             tilted = isinstance(cause.effect, GravityTilt)
             if tilted or (markers and isinstance(cause.effect, Turned)):

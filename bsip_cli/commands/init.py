@@ -28,7 +28,6 @@ from bsip_cli.study.trials import listed
 
 # --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
 
-
 _NAMES = ("participants", "subjects")
 _KINDS = (".tsv", ".csv")
 
@@ -73,7 +72,6 @@ def read_tables(
 
 
 # --- the marker set of a study that ``bsip init`` makes: a shipped one, or one of the labels ------
-
 
 STARTER = "markers.toml"
 

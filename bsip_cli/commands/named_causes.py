@@ -124,9 +124,8 @@ def words_of(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -
         factor, readable = readable_unit(name, unit)
         mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's own
         nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
-        low, high = (
-            factor * (nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL)[0]
-        )
+        known = nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL
+        low, high = factor * known[0]
         size, interval = f"{factor * value:.3g}", ""
         if high > low:
             size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))

@@ -234,7 +234,6 @@ class Document:
 
 # --- a document as one self-contained HTML page ---------------------------------------------------
 
-
 FILES = "figures"  # folder next to the page that holds its figures and the numbers behind them
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"

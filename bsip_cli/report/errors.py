@@ -171,7 +171,6 @@ def _change(ratio: float, log_error: float) -> str:
 
 # --- three numbers of a recording against those of good laboratories and the literature -----------
 
-
 COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""

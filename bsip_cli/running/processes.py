@@ -106,7 +106,6 @@ def endings_wait() -> Iterator[None]:
 
 # --- workers ----------------------------------------------------------------------------------
 
-
 _SPAWN = multiprocessing.get_context("spawn")
 _TO_END_S = 2.0  # for a worker that was asked to end; then it is killed
 

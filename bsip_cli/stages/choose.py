@@ -134,10 +134,8 @@ def _compared(other: str, one: choice.Difference) -> str:
 
 
 def _judges(unit: Unit) -> tuple[list[Judge], str]:
-    """Moving trials that OM never saw; without any, the seconds of its own that were held out.
-
-    Forces that an external contact bears judge nobody.
-    """
+    """Moving trials that OM never saw; without any, the seconds of its own that were held out. What
+    an external contact bears judges nobody."""
     own = set(unit.read("used-blocks")["trial"])
     contacts = unit.facts("identification")["external_contacts"]
     moving = [t for t in unit.trials("fit", "reconstruction") if t.role != "static"]

@@ -131,7 +131,6 @@ def _of_markers(
 
 # --- the error budget -----------------------------------------------------------------------------
 
-
 _KIND = "overall-error-budget"
 _MORE_THAN_USUAL = 2.0  # times the usual size: what is usual is no cause of a large error
 _MOST_PERCENT = 20.0  # of the squared error: less explains nothing

@@ -131,8 +131,7 @@ class _Cohort:
         return values
 
     def _lacks(self, what: str, *numbers: int, is_reported: bool = False) -> None:
-        """`what` ("sub-02 has no ...") is not in the tables with these numbers: a message says it,
-        unless that is done."""
+        """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
         if not is_reported:
             tables = f"table{'s' * (len(numbers) > 1)} {listing([*map(str, numbers)])}"
             self._unit.warn(f"{what}: not in {tables}")

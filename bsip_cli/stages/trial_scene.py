@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -73,10 +74,8 @@ def with_labels_corrected(
 
 def plate_names(wrench: pd.DataFrame) -> tuple[str, ...]:
     """Of the plates whose readings a ``wrench`` table holds."""
-    columns = (str(c) for c in wrench)
-    return tuple(
-        c.removeprefix("plate").removesuffix("_fx_N") for c in columns if c.endswith("_fx_N")
-    )
+    found = (re.fullmatch(r"(?:plate)?(.*)_fx_N", str(column)) for column in wrench)
+    return tuple(one[1] for one in found if one)
 
 
 def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:

@@ -83,7 +83,6 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
 
 # --- values, and those that belong to one line of a table -----------------------------------------
 
-
 DIFFERENCE = f"|{OM}-{RM}|"  # the method of a value that is how far both are apart
 OVER_TASKS = ("table2", "table3", "table6")
 """Tables of the identification sequence, under whatever task names it was recorded."""

@@ -94,7 +94,6 @@ def p_of_one_size(estimates: np.ndarray, widths: np.ndarray) -> float:
 
 # --- is a sample normal enough for a t test? ------------------------------------------------------
 
-
 MINIMUM_FOR_LILLIEFORS = 4  # the simulated table of critical values starts here
 
 
@@ -167,7 +166,6 @@ def mean_of(values: NDArray[np.float64]) -> float:
 
 # --- contiguous intervals of a sampled signal: half-open index pairs (start, stop) into it --------
 
-
 Intervals = Sequence[tuple[int, int]]
 """(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
 
@@ -210,7 +208,6 @@ def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[n
 
 
 # --- how many independent samples an autocorrelated series is worth -------------------------------
-
 
 MINIMUM_SAMPLES = 4  # below this no autocorrelation can be estimated and the answer is nan
 WINDOW_PER_TIME = 5.0  # lags summed, in integrated correlation times (Sokal 1997, section 3)

@@ -307,7 +307,6 @@ def _typical(ratios: np.ndarray) -> float:
 
 # --- what is wrong in whose recordings, and what several people share -----------------------------
 
-
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
 _STATES: dict[State, str] = TEXTS["states"]

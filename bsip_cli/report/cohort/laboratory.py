@@ -41,18 +41,13 @@ def section(record: CohortRecord) -> Section:
     if table is not None:
         for number, rows in _of_several(table).groupby("laboratory"):
             name = f"laboratory_{number}"
-            cells = tuple(map(_row, _listed(rows)))
+            said = rows["verdict"].isin(SAID)  # and of each other fault the likeliest number
+            rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]
+            likeliest = rest.sort_values("probability", ascending=False).drop_duplicates("effect")
+            cells = tuple(map(_row, pd.concat([rows[said], likeliest]).to_dict("records")))
             caption = f"Laboratory {number}. {_TEXTS['caption']}"
             blocks.append(Grid(_HEAD, cells, caption, words=3, name=name, data=rows))
     return Section("laboratory", "The laboratory", tuple(blocks))
-
-
-def _listed(rows: pd.DataFrame) -> list[dict]:
-    """What is said, and of each other fault the likeliest number."""
-    said = rows["verdict"].isin(SAID)
-    rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]
-    likeliest = rest.sort_values("probability", ascending=False).drop_duplicates("effect")
-    return pd.concat([rows[said], likeliest]).to_dict("records")
 
 
 def named_sentences(table: pd.DataFrame) -> Iterator[str]:

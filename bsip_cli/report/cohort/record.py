@@ -134,7 +134,6 @@ class CohortRecord:
 
 # --- causes that several people's recordings share ------------------------------------------------
 
-
 SHARED = TEXTS["shared_causes"]
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
@@ -164,9 +163,17 @@ def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
     alike; what most people have comes first. The laboratory's faults are in its own part."""
-    shared = [found for found in _found(people) if len(found.people) > 1]
-    shared.sort(key=lambda found: -len(found.people))
-    said = [_in_words(found, people) for found in shared[:_MOST_SAID]]
+    found: dict[str, _Found] = {}
+    for person in people:
+        for cause in person.causes:
+            for one in (x for x in cause if not x.is_of_all):
+                known = found.setdefault(one.label, _Found(one.label, {}, set()))
+                known.people.setdefault(person.id, []).append(one)
+                if len(cause) == 1:
+                    known.named_of.add(person.id)
+    shared = [one for one in found.values() if len(one.people) > 1]
+    shared.sort(key=lambda one: -len(one.people))
+    said = [_in_words(one, people) for one in shared[:_MOST_SAID]]
     left = len(shared) - len(said)
     return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
 
@@ -178,18 +185,6 @@ class _Found:
     label: str
     people: dict[str, list[Candidate]]
     named_of: set[str]
-
-
-def _found(people: Sequence[Searched]) -> list[_Found]:
-    found: dict[str, _Found] = {}
-    for person in people:
-        for cause in person.causes:
-            for one in (x for x in cause if not x.is_of_all):
-                known = found.setdefault(one.label, _Found(one.label, {}, set()))
-                known.people.setdefault(person.id, []).append(one)
-                if len(cause) == 1:
-                    known.named_of.add(person.id)
-    return list(found.values())
 
 
 def _in_words(found: _Found, people: Sequence[Searched]) -> str:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
 from bsip_cli.report.blocks import Bar
 from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills
@@ -88,7 +88,6 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
 def _ticks(axes: Axes, low: float, high: float) -> None:
     axes.set_xlim(low, high)
     ticks = [t for t in _TICKS if low <= t <= high]
-    axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
 
@@ -129,7 +128,6 @@ def segment_masses(data: pd.DataFrame) -> Figure:
 
 
 # --- a dot per person: errors and their yardsticks, and what identification gains -----------------
-
 
 _SPREAD = 0.28
 

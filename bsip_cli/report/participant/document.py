@@ -69,7 +69,6 @@ def participant_document(record: records.ParticipantRecord) -> Document:
 
 # --- what was recorded: trials, what was repaired or left out, markers ----------------------------
 
-
 _MOST_FINDINGS = 10
 _MOST_EVENTS = 6
 _LEVELS = ("excluded", "warning", "corrected")
@@ -172,7 +171,6 @@ def _events(record: records.ParticipantRecord) -> Iterator[Block]:
 
 # --- which segment parameters come out, how sure they are, and in which movements to use them -----
 
-
 _FROM_TABLE = 0.2  # less of the variance than this removed: the number is the table's
 _COM = ["com_x_m", "com_y_m", "com_z_m"]
 _RATIOS = ("om", "rm_mass", "om_rm_mass")
@@ -263,7 +261,6 @@ def _next(record: records.ParticipantRecord) -> Iterator[Block]:
 
 
 # --- what is wrong, and how sure that is: causes, size and effect, what could not be seen ----------
-
 
 _NEAREST = 4  # rejected causes that are listed
 _BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")

@@ -46,42 +46,34 @@ def section(record: ParticipantRecord) -> Section:
 
 
 def _over_time(record: ParticipantRecord) -> Iterator[Block]:
-    trial, window = _most_compared(record)
-    if trial is None:
+    """Of the trial with most compared frames that OM did not see, if any, up to ten seconds of its
+    longest interval."""
+    own = {trial.stem for trial in record.identification_trials()}
+    tables = [(one, t) for one in record.moving_trials() if (t := one.reconstruction) is not None]
+    counts = [int(flags_of(table, "valid").sum()) for _, table in tables]
+    found = [
+        (one.stem not in own, count, one, table)
+        for count, (one, table) in zip(counts, tables, strict=True)
+        if count > 1
+    ]
+    if not found:
         yield Paragraph("No recording has forces that could be compared.", "warning")
         return
-    assert trial.reconstruction is not None
-    clock = clock_of(trial.reconstruction)[window]
+    *_, trial, table = max(found, key=lambda one: one[:2])
+    valid = flags_of(table, "valid")
+    window = middle_of_longest(clock_of(table), valid, _WINDOW_S)
+    clock = clock_of(table)[window]
     data, panels = {"time_s": clock}, []
     for column, title, scale in _PANELS:
-        signals = signals_of(trial.reconstruction, column)
-        valid = flags_of(trial.reconstruction, "valid")
+        signals = signals_of(table, column)
         shown = {m: scale * np.where(valid, v, np.nan)[window] for m, v in signals.items()}
         panels.append(Panel(title, clock, shown))
         data |= {f"{column}_{m}": v / scale for m, v in shown.items()}
-    seen = flags_of(trial.reconstruction, "used")[window].any()
+    seen = flags_of(table, "used")[window].any()
     fitted = "used to identify, which favours OM" if seen else "not used to identify"
     words = {"start": f"{clock[0]:.1f}", "end": f"{clock[-1]:.1f}", "fitted": fitted}
     numbers = pd.DataFrame(data)
     yield picture("forces", curves(panels, 1), numbers, trial=trial.label, **words)
-
-
-def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
-    """The trial with most compared frames that OM did not see, if any, and up to ten seconds of its
-    longest interval."""
-    own = {trial.stem for trial in record.identification_trials()}
-    found = [
-        (trial.stem not in own, int(flags_of(trial.reconstruction, "valid").sum()), trial)
-        for trial in record.moving_trials()
-        if trial.reconstruction is not None and len(trial.reconstruction)
-    ]
-    found = [one for one in found if one[1] > 1]
-    if not found:
-        return None, slice(0)
-    *_, trial = max(found, key=lambda one: one[:2])
-    assert trial.reconstruction is not None
-    clock, valid = clock_of(trial.reconstruction), flags_of(trial.reconstruction, "valid")
-    return trial, middle_of_longest(clock, valid, _WINDOW_S)
 
 
 # --- what makes them ----------------------------------------------------------------------------
@@ -156,7 +148,6 @@ def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator
 
 
 # --- what identification and named faults change at the joints: curves and peaks of the moments ---
-
 
 _LEGS = ("hip", "knee", "ankle")
 _ARMS = ("shoulder", "elbow")

@@ -200,14 +200,6 @@ def columns(name: str, pair: tuple[str, str] = (OM, RM), **words: str) -> tuple[
 NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
 
 
-def participants(rows: Iterable[Comparison]) -> str:
-    """n = 8 participants, or the range over the rows."""
-    numbers = [row.n for row in rows] or [0]
-    low, high = min(numbers), max(numbers)
-    word = "participant" if high == 1 else "participants"
-    return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
-
-
 TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
@@ -216,8 +208,10 @@ def texts_of(
 ) -> tuple[str, tuple[str, ...]]:
     """Title and legend of a table; ``more``: what only this one says."""
     words = TEXTS["shared"] | more
-    words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
-    words["percent"] = f"{criteria.equivalence_percent:g}"
+    numbers = sorted({row.n for row in tests} or {0})
+    how_many = " to ".join(dict.fromkeys(map(str, (numbers[0], numbers[-1]))))
+    words["n"] = f"n = {how_many} participant{'' if numbers[-1] == 1 else 's'}"
+    words |= {"alpha": f"{criteria.alpha:g}", "percent": f"{criteria.equivalence_percent:g}"}
     words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
     words["star"] = f"* significant: p < {_level(criteria.alpha)}."
     words["holm"] = _holm_legend(tests, criteria.alpha)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from math import nan
 
 from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table, count, mean_sd
-from bsip_cli.statistics.cohort import Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import Paper, PrintedTable, load_paper
 from bsip_cli.statistics.published import Row as PrintedRow
@@ -93,7 +92,11 @@ def _here(method: str, of: str = "") -> tuple[str, str]:
 
 
 def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
-    topic = _topic(results, row)
+    variable, _, task = row.compare.partition(" ")
+    topic = None  # the same variable, in the task of that name where the row is of one
+    for one in (one for one in results.topics if one.variable == variable):
+        role_fits = one.role == "sequence" if task == "sequence" else task in ("", one.task)
+        topic = topic or (one if role_fits else None)
     if topic is None:
         return {}
     found = [results.find(topic, "paired_t")]
@@ -106,16 +109,6 @@ def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
         numbers = (pair.mean_a, pair.sd_a, pair.mean_b, pair.sd_b)
         values |= dict(zip(fields, numbers, strict=True))
     return values
-
-
-def _topic(results: Results, row: PrintedRow) -> Topic | None:
-    """The same variable of this study, in the task of that name where the row is of one."""
-    variable, _, task = row.compare.partition(" ")
-    for topic in results.topics:
-        role_fits = topic.role == "sequence" if task == "sequence" else task in ("", topic.task)
-        if topic.variable == variable and role_fits:
-            return topic
-    return None
 
 
 def _notes(paper: Paper, as_printed: PrintedTable, meant: PrintedTable) -> Iterator[str]:

@@ -22,6 +22,7 @@ from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
 from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
+from bsip_cli.report.blocks import environment
 from bsip_cli.study import participants
 from bsip_cli.study.new_study import Named, counted, is_sequence, name_all, plain
 from bsip_cli.study.trials import listed
@@ -303,26 +304,11 @@ def _table(rows: Iterable[tuple[str, ...]]) -> str:
 
 def _study_toml(plan: _Plan) -> str:
     tasks = sorted({named.task for named in plan.named.values()})
-    sequences = [task for task in tasks if is_sequence(task)]
-    roles = ", ".join(f'"{task}"' for task in sequences or ["sequence"])
-    about = "" if sequences else "  # none here: the trial with most contacts on plates identifies"
-    lines = [
-        "# Made by bsip init; configs/default.toml lists every option with its unit.",
-        f'marker_set = "{plan.markers.name}"',
-        "",
-        "[roles]",
-        'static = ["static"]',
-        f"sequence = [{roles}]{about}",
-    ]
+    sequences = ", ".join(f'"{task}"' for task in tasks if is_sequence(task))
     moving = Counter(n.participant for n in plan.named.values() if n.task != "static")
-    if moving and max(moving.values()) == 1 and not sequences:
-        lines += [
-            "",
-            "# Nobody has a second movement to validate with: parts of the only one are held out.",
-            "[identify]",
-            "hold_out_fraction = 0.4",
-        ]
-    return "\n".join(lines) + "\n"
+    alone = set(moving.values()) == {1} and not sequences
+    known = {"marker_set": plan.markers.name, "sequences": sequences, "alone": alone}
+    return environment().get_template("study.toml.j2").render(known)
 
 
 # --- what is said ---------------------------------------------------------------------------------

@@ -76,8 +76,8 @@ class Candidate(Judged):
         """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
         size, usual = self.main_number(), effect_words.USUAL.get(self.effect)
         if size is None or usual is None or self.effect in effect_words.OBJECTS:
-            return ""
-        if size.name not in usual.parameters or size.unit != usual.unit:
+            return ""  # an object has no usual size
+        if (size.name, size.unit) not in {(name, usual.unit) for name in usual.parameters}:
             return ""
         shown = float(f"{abs(size.value):.2g}")  # as it is read
         how = "smaller than usual" if shown < usual.least else "a usual size"

@@ -67,7 +67,7 @@ NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 class Verdict:
     """All that is said of a diagnosis.
 
-    headline : whether anything is wrong. found : whether anything was.
+    headline : whether anything is wrong.
     causes : a text per cause or group of causes that cannot be distinguished here.
     results : what the causes do to forces and parameters, and where they were looked for.
     advice : what follows for the reader.
@@ -75,7 +75,6 @@ class Verdict:
     """
 
     headline: str
-    found: bool
     causes: tuple[str, ...]
     results: tuple[str, ...]
     advice: tuple[str, ...]
@@ -105,7 +104,6 @@ def verdict_of(
         results.append(f"Recordings analysed: {listing([*map(trial_label, everywhere)])}.")
     return Verdict(
         f"{light.title}. {light.text}".rstrip(),
-        bool(causes),
         (*before, *(cause_text(cause, everywhere) for cause in causes)),
         tuple(results),
         (*filter(None, [_named_twice(causes)]), *consequences(causes, 1 + len(before))),

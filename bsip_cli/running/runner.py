@@ -191,11 +191,9 @@ def _state(task: _Task) -> str:
 
 
 def _run_alone(task: _Task) -> Iterator[Outcome]:
-    """Unit by unit; what cannot be written ends it, else the rest would be made without it.
-
-    Who is not up to date is left out of the group; and a word is said where stages that are run
-    alone build on what is not.
-    """
+    """Unit by unit; what cannot be written ends it, else the rest would be made without it. Who is
+    not up to date is left out of the group; and a word is said where stages that are run alone
+    build on what is not."""
     study, left_out = task.study, dict[str, str]()
     if task.participant is not None:
         _forget_gone_recordings(task.folder, task.participant)

@@ -139,28 +139,23 @@ def _judges(unit: Unit) -> tuple[list[Judge], str]:
     own = set(unit.read("used-blocks")["trial"])
     contacts = unit.facts("identification")["external_contacts"]
     moving = [t for t in unit.trials("fit", "reconstruction") if t.role != "static"]
+    known = []
     for trial in moving:
         if trial.stem in contacts:
             found = Support(**contacts[trial.stem]).words()
             unit.say(f"{trial.stem} does not judge: {found}")
-    judges = [_judge(unit, trial) for trial in moving if trial.stem not in contacts]
-    known = [judge for judge in judges if judge is not None]
+            continue
+        fit = unit.read("fit", trial)
+        held_out = fit[(fit["data"] == "held_out") & fit["method"].isin(METHODS)]
+        errors = held_out.pivot(index="component", columns="method", values="rmse")
+        errors = errors.reindex(index=choice.COMPONENTS, columns=METHODS).dropna()
+        if not errors.empty:  # some held-out frame compares all methods
+            force_N = np.sqrt((errors.reindex(_FORCE) ** 2).sum()).to_dict()
+            components = [choice.COMPONENTS.index(name) for name in errors.index]
+            alone = partial(_within, unit, trial, components)
+            known.append(Judge(trial, np.log(errors).mean().to_dict(), force_N, alone))
     unseen = [judge for judge in known if judge.trial.stem not in own]
     return (unseen, "whole_trials") if unseen else (known, "held_out" if known else "none")
-
-
-def _judge(unit: Unit, trial: Trial) -> Judge | None:
-    fit = unit.read("fit", trial)
-    held_out = fit[(fit["data"] == "held_out") & fit["method"].isin(METHODS)]
-    errors = held_out.pivot(index="component", columns="method", values="rmse")
-    errors = errors.reindex(index=choice.COMPONENTS, columns=METHODS).dropna()
-    if errors.empty:
-        return None
-    logs = np.log(errors).mean()
-    force_N = np.sqrt((errors.reindex(_FORCE) ** 2).sum())
-    components = [choice.COMPONENTS.index(name) for name in errors.index]
-    alone = partial(_within, unit, trial, components)
-    return Judge(trial, logs.to_dict(), force_N.to_dict(), alone)
 
 
 def _within(

@@ -307,13 +307,10 @@ def _columns(person: Person, q: np.ndarray) -> np.ndarray:
 def _extended(
     unit: Unit, trial: _Trial, bsip: pd.DataFrame, spread: Spread, methods: Sequence[str]
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
-    """Method, loads and valid frames (N, J) of the extended models of this trial.
-
-    Forces freed of the errors of plates and clock, axes of their tilts; parameters as ``extend``
-    found them; what else a segment carries, as a ball in a hand, loads the joints on its way to
-    the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
-    joints or single markers would need another motion: no model with one of them is computed.
-    """
+    """Method, loads and valid frames (N, J) of the extended models of this trial: forces freed of
+    the errors of plates and clock, axes of their tilts; parameters as ``extend`` found them; what
+    else a segment carries, as a ball in a hand, loads the joints on its way to the pelvis. OM's
+    covariance stands for theirs: they come from the same data."""
     causes, extended = causes_of(unit), unit.read("extended-bsip")
     own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
     if not own or extended.empty:

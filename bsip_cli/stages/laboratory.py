@@ -221,13 +221,10 @@ def _rows(
         them = [sessions[k] for k in deviation.sessions]
         who = them[0].name if len(them) == 1 else ""
         where = f"in {who}" if who else f"from {them[0].name} on"
-        cells = {
-            "since": "" if who else them[0].name,
-            "sentence": f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}",
-            "laboratory": laboratory,
-            "scope": "person" if deviation.cause.effect == STATED_MASS.name else "session",
-            "who": who,
-        }
+        what = f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}"
+        scope = "person" if deviation.cause.effect == STATED_MASS.name else "session"
+        cells = {"since": "" if who else them[0].name, "sentence": what}
+        cells |= {"laboratory": laboratory, "scope": scope, "who": who}
         yield from _rows_of(deviation, _counts(them, deviation.cause), cells)
 
 

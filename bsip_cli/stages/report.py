@@ -22,17 +22,14 @@ from bsip_cli.stages.frames import load_words, person_of
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 
+# Field of a trial's record: kind of artifact.
 _KINDS = ("quality", "kinematics", "marker-events", "reconstruction", "fit", "joint-moments")
-_TABLES = {"residuals": "marker-residuals"} | {  # field of a trial's record: kind of artifact
-    kind.replace("-", "_"): kind for kind in (*_KINDS, "joint-peaks")
-}
+_TABLES = {"residuals": "marker-residuals", "joint_peaks": "joint-peaks"}
+_TABLES |= {kind.replace("-", "_"): kind for kind in _KINDS}
 _DIGITS = "%.6g"  # of a number in a CSV file
-_FOUND = {  # field of a participant's record: kind that is there only if its stage has run
-    "diagnosis": "overall-diagnosis",
-    "detection": "detection",
-    "budget": "overall-error-budget",
-    "choice": "choice",
-}
+# Field of a participant's record: kind that is there only if its stage has run.
+_FOUND = {"diagnosis": "overall-diagnosis", "budget": "overall-error-budget"}
+_FOUND |= {kind: kind for kind in ("detection", "choice")}
 
 
 def run(unit: Unit) -> None:

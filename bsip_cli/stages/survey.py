@@ -197,14 +197,10 @@ def _row(verdict: Verdict) -> dict:
 def _verdict(row: dict) -> Verdict:
     centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
     same = ("moment_scale", "point_scale", "about", "place_of", "channels")
-    reading = PlateReading(
-        **{name: row[name] for name in same},
-        centre_m=None if pd.isna(centre[0]) else centre,
-        turn=int(row["turn"]),
-        mirrored=bool(row["reversed_round"]),
-        sign=int(row["sign"]),
-        half_size_m=None if pd.isna(half[0]) else half,
-    )
+    known = {name: row[name] for name in same} | {"mirrored": bool(row["reversed_round"])}
+    known |= {"turn": int(row["turn"]), "sign": int(row["sign"])}
+    known |= {"centre_m": None if pd.isna(centre[0]) else centre}
+    reading = PlateReading(**known, half_size_m=None if pd.isna(half[0]) else half)
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
@@ -220,11 +216,9 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
     if not rows:
         return SessionReading()
     first = rows[0]
-    frame = FrameChange(
-        **{name: first[name] for name in ("moved", "turned_deg", "turned_sd_deg", "unsure_m")},
-        axis=int(first["axis"]),
-        corners_only=bool(first["corners_only"]),
-    )
+    known = {name: first[name] for name in ("moved", "turned_deg", "turned_sd_deg", "unsure_m")}
+    axis, is_of_corners = int(first["axis"]), bool(first["corners_only"])
+    frame = FrameChange(**known, axis=axis, corners_only=is_of_corners)
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
     written = {name: facts[name].get(trial.stem, 1.0) for name in asdict(AS_WRITTEN)}
     of_trials = {name: facts[name] for name in _OF_TRIALS}

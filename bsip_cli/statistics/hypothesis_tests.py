@@ -183,10 +183,8 @@ def _without_rounding(
 
 
 def _hodges_lehmann(whole: NDArray[np.int64]) -> float:
-    """Median of the means of all pairs, each value with itself too.
-
-    The pairs are counted, not formed: those of a large cohort would fill the memory.
-    """
+    """Median of the means of all pairs, each value with itself too, which are counted, not formed:
+    those of a large cohort would fill the memory."""
     ordered, own = np.sort(whole), np.arange(len(whole))
 
     def pairs_up_to(total: int) -> int:

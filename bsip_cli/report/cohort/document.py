@@ -66,6 +66,7 @@ _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
 J Exp Soc Psychol 49, 764."""
 _FEWEST = 5  # persons among whom one can lie far out
+_GAIN = "Do identified parameters follow the forces better?"
 
 
 def cohort_document(record: CohortRecord) -> Document:
@@ -77,9 +78,7 @@ def cohort_document(record: CohortRecord) -> Document:
             Section("people", "Who took part?", (_people(record),)),
             diagnoses_section(record),
             laboratory.section(record),
-            Section(
-                "gain", "Do identified parameters follow the forces better?", tuple(_gain(record))
-            ),
+            Section("gain", _GAIN, tuple(_gain(record))),
             Section("tables", "The papers' tables", tuple(_tables(record))),
             Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
             WORDS,

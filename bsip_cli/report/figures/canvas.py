@@ -29,14 +29,8 @@ MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay
 _MM = 1.0 / 25.4
 _DPI_OF_SVG = 72.0
 _FONTS = b"'DejaVu Sans', Verdana, Arial, sans-serif"  # of much the same width
-_RC: dict[Any, Any] = {
-    "svg.hashsalt": "bsip",
-    "svg.fonttype": "none",
-    "font.family": "DejaVu Sans",
-    "font.size": 8,
-    "axes.unicode_minus": True,
-    "path.simplify": True,
-}
+_RC: dict[Any, Any] = {"svg.hashsalt": "bsip", "svg.fonttype": "none", "path.simplify": True}
+_RC |= {"font.family": "DejaVu Sans", "font.size": 8, "axes.unicode_minus": True}
 
 
 @dataclass(frozen=True)

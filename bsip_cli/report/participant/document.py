@@ -296,13 +296,12 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
     rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
-    sure = (verdict.probability_words(one.probability) or MISSING for one in rejected)
-    rows = tuple(
-        (one.label, probability, number(one.rms_change, 1), one.removes())
-        for one, probability in zip(rejected, sure, strict=True)
-    )
+    rows = []
+    for one in rejected:
+        sure = verdict.probability_words(one.probability) or MISSING
+        rows.append((one.label, sure, number(one.rms_change, 1), one.removes()))
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
-    return (Grid(head, rows, TEXTS["captions"]["nearest"]),)
+    return (Grid(head, tuple(rows), TEXTS["captions"]["nearest"]),)
 
 
 # --- limits -------------------------------------------------------------------------------------

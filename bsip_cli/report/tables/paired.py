@@ -46,15 +46,13 @@ def _tests(criteria: Criteria) -> tuple[model.Column, ...]:
 
 def against_rm_mass(criteria: Criteria) -> tuple[model.Column, ...]:
     """The same tests with RM+mass, of which only p is printed."""
-    return tuple(
-        replace(
-            one,
-            fields=tuple(_PREFIX[RM_MASS] + name for name in one.fields),
-            heading=_P[RM_MASS] if one.heading == _P[RM] else "",
-            of=tuple((test, name, OM, RM_MASS) for test, name, *_ in one.of),
-        )
-        for one in _tests(criteria)
-    )
+    found = []
+    for one in _tests(criteria):
+        fields = tuple(_PREFIX[RM_MASS] + name for name in one.fields)
+        heading = _P[RM_MASS] if one.heading == _P[RM] else ""
+        of = tuple((test, name, OM, RM_MASS) for test, name, *_ in one.of)
+        found.append(replace(one, fields=fields, heading=heading, of=of))
+    return tuple(found)
 
 
 def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[model.Column]:

@@ -8,11 +8,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from bsip_cli.report import blocks, budget_words, errors, recordings, verdict
+from bsip_cli.report import blocks, budget_words, errors, verdict
 from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
 from bsip_cli.report.effect_words import effect_title, separating_recording
 from bsip_cli.report.error_shape import shape_of
 from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.recordings import (
+    beyond,
+    is_said,
+    large_alone,
+    large_finding,
+    largest_in,
+    light_for,
+    main_part,
+    measured_of,
+    must_wait,
+    names_of,
+    number_of_main_part,
+    numbered,
+    om_waits,
+    use_lines,
+    worst_of,
+)
 from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
 from bsip_cli.report.words import (
     TEXTS,
@@ -39,10 +56,8 @@ _POSES = 8  # among which the one is chosen that is shown
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks; as many findings as there
     is room for."""
-    light = recordings.light_for(record)
-    says_it = light.state in ("large", "cause") and (
-        record.causes or recordings.large_finding(record)
-    )
+    light = light_for(record)
+    says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
     first = (
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
@@ -59,9 +74,9 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
 
 def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
     yield blocks.Heading("What may be used?")
-    yield blocks.Bullets(tuple(recordings.use_lines(record)))
+    yield blocks.Bullets(tuple(use_lines(record)))
     known = record.choice, record.identification
-    yield blocks.Paragraph(errors.use_sentence(*known, recordings.must_wait(record), is_known=True))
+    yield blocks.Paragraph(errors.use_sentence(*known, must_wait(record), is_known=True))
 
 
 def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator[blocks.Block]:
@@ -88,9 +103,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     short = abbreviations(names)
     yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}; {_recorded(record)}"
     yield "Files", _files(record)
-    used = listing(
-        [recordings.names_of(record)[t.stem] for t in record.identification_trials()], "nothing"
-    )
+    used = listing([names_of(record)[t.stem] for t in record.identification_trials()], "nothing")
     yield "Parameters", TEXTS["parameters"].format(trials=used)
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Report", f"{record.made_on}, bsip {', '.join(versions)}"
@@ -151,7 +164,7 @@ def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    peaks, large = all_peaks(record.trials), recordings.large_finding(record)
+    peaks, large = all_peaks(record.trials), large_finding(record)
     shown = _causes_shown(record, most)
     lines = [
         verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
@@ -191,7 +204,7 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
 
 
 def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
-    return record.causes[: most - len(recordings.large_finding(record))]
+    return record.causes[: most - len(large_finding(record))]
 
 
 def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Block]:
@@ -202,7 +215,7 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     unseen = verdict.unseen(record.detection, record.diagnosis)
     said = []
     if light.state == "large":
-        part, is_left = recordings.main_part(record)
+        part, is_left = main_part(record)
         known = "unknown" if part is None else "part" if is_left else "known"
         said.append(TEXTS["sure"][known])
         unseen = unseen if known == "known" else ""
@@ -220,14 +233,10 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
-    used, first, other = (
-        record.use_words(),
-        recordings.measured_of(record),
-        recordings.measured_of(record, RM),
-    )
-    later = " (not to be used yet)" if recordings.must_wait(record) else ""
+    used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
+    later = " (not to be used yet)" if must_wait(record) else ""
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
-    if recordings.om_waits(record):
+    if om_waits(record):
         first, other = other, first
         which = f"? ● {RM}, ○ {used}{later}"
     scales = []
@@ -245,10 +254,10 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """What makes the error of the table's parameters, as one bar, and how to read it."""
     if record.budget is None:
         return
-    findings = {k: effects_in([cause]) for k, cause in recordings.numbered(record).items()}
+    findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
     if pieces := budget_words.numbered_pieces(record.budget, findings):
         use = record.use()
-        if use == OM and not (recordings.om_waits(record) or recordings.beyond(record)):
+        if use == OM and not (om_waits(record) or beyond(record)):
             known = f"{budget_words.PARAMETERS} (OM corrects these)"
             pieces = tuple(
                 replace(one, label=one.label.replace(budget_words.PARAMETERS, known))
@@ -263,7 +272,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
 
 def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str]:
     """The most important first."""
-    causes, first = _causes_shown(record, most), 1 + len(recordings.large_finding(record))
+    causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
     few = record.causes if len(record.causes) <= _FEW else causes
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record)
@@ -274,13 +283,10 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    if not recordings.beyond(record):
-        alone = (
-            _look_for(record, *recordings.largest_in(record, one))
-            for one in recordings.large_alone(record)
-        )
+    if not beyond(record):
+        alone = (_look_for(record, *largest_in(record, one)) for one in large_alone(record))
         said += filter(None, alone)
-    if light.state == "inconclusive" and not recordings.beyond(record):
+    if light.state == "inconclusive" and not beyond(record):
         said.append(TEXTS["to_do"]["contacts"])
     if light.state == "fine" and not said:
         said.append(TEXTS["usable"]["fine"])
@@ -294,12 +300,12 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
     """Where to look for what makes the largest error, which is the first finding; nothing where
     another finding makes the largest part."""
-    if recordings.number_of_main_part(record):
+    if number_of_main_part(record):
         return
-    is_finding = bool(recordings.large_finding(record)) or recordings.is_said(record)
+    is_finding = bool(large_finding(record)) or is_said(record)
     number_of_it = "Finding 1: " if is_finding else ""
-    for one, _ in recordings.beyond(record)[:1]:
-        worst = recordings.worst_of(record, one)
+    for one, _ in beyond(record)[:1]:
+        worst = worst_of(record, one)
         if one.name == errors.MARKERS:
             yield f"{number_of_it}{TEXTS['to_do']['markers']}"
         elif worst is not None and (text := _look_for(record, worst, one)):
@@ -313,11 +319,7 @@ _SIGNALS = {errors.COP: ("cop_ap_m", "cop_ml_m"), errors.FORCE: ("fz_N",)}
 def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yardstick) -> str:
     """What makes the largest part of a recording's error and what helps; empty where that is a
     finding; where it is not known, when the error is largest and what to check first."""
-    name, found, texts = (
-        recordings.names_of(record)[trial.stem],
-        effects_in(record.causes),
-        TEXTS["to_do"],
-    )
+    name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
     budget, of = record.budget, (trial.stem, _OF[error.name])
     if budget is not None and (parts := budget_words.overall_pieces(budget, found, *of)):
         main = max(parts, key=lambda one: one.share)

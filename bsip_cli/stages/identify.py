@@ -23,8 +23,15 @@ from bsip_cli.identification.problem import Estimate, Problem, Recording
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names, spread_names
 from bsip_cli.segments import in_words as segment_in_words
-from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
+from bsip_cli.stages.identification_problem import (
+    duration_s,
+    estimate_by,
+    prior_from,
+    problem_of,
+    recordings_of,
+    usable_frames,
+)
 from bsip_cli.stages.trial_scene import motion_and_wrench_of
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
@@ -37,16 +44,16 @@ def run(unit: Unit) -> None:
     person = person_of(unit)
     skeleton = person.skeleton
     regression = unit.read("regression")
-    prior = identification_problem.prior_from(unit, regression, person)
+    prior = prior_from(unit, regression, person)
     contacts = _external_contacts(unit, person, prior.phi)
     facts = {"external_contacts": {stem: asdict(one) for stem, one in contacts.items()}}
     trials = _identification_trials(unit, contacts)
-    recordings, blocks = identification_problem.recordings_of(unit, person, trials)
+    recordings, blocks = recordings_of(unit, person, trials)
     for trial in trials:
         known = load_words(unit, trial) if trial.stem in set(blocks["trial"]) else ""
         if known:
             unit.say(f"taken off the forces of {trial.stem} as a known load: {known}")
-    if identification_problem.duration_s(recordings) < _SHORTEST_S:
+    if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings, facts)
         unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
         return
@@ -57,14 +64,11 @@ def run(unit: Unit) -> None:
             f"no data for {', '.join(map(segment_in_words, fixed))}: no markers show "
             "how they move, OM keeps the table's values (RM) there"
         )
-    problem, reference = identification_problem.problem_of(unit, person, prior, recordings)
+    problem, reference = problem_of(unit, person, prior, recordings)
     # by method: OM is the first that is configured, others go by their names
     first, *others = unit.config.identify.estimators
     estimators = {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
-    estimates = {
-        method: identification_problem.estimate_by(name, problem)
-        for method, name in estimators.items()
-    }
+    estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
     shares: dict[str, np.ndarray] = {}
     tables, roots = [regression.drop(columns=["note", *spread_names()])], {RM: prior.root}
     for method, estimate in estimates.items():
@@ -89,9 +93,8 @@ def run(unit: Unit) -> None:
 def _write_table_only(
     unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
 ) -> None:
-    seconds = identification_problem.duration_s(recordings)
     unit.say(
-        f"{seconds:.2f} s of motion with every contact on a plate, "
+        f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
     unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
@@ -120,9 +123,7 @@ def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[
     named = [trial for trial in ready if trial.role == "sequence"]
     chosen = [trial for trial in named if trial.stem not in contacts]
     if not chosen:
-        counts = {
-            trial: int(identification_problem.usable_frames(unit, trial).sum()) for trial in ready
-        }
+        counts = {trial: int(usable_frames(unit, trial).sum()) for trial in ready}
         measured = [trial for trial in ready if counts[trial] > 0]
         moving = [trial for trial in measured if trial.role != "static"] or measured
         free = [trial for trial in moving if trial.stem not in contacts]

@@ -187,7 +187,8 @@ class _Correction:
         self.left += [f"{words}: bsip reads the file so" for words in kept if words]
 
     def _as_diagnosed(self, cause: Cause) -> Cause:
-        """With the sizes that the diagnosis reports; of the laboratory those by all persons."""
+        """With the sizes that the diagnosis reports; of the laboratory those by all persons: for
+        ``extend`` a person's own recordings are left out of them."""
         found = named.rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
         names = [one.name for one in cause.effect.parameters(self._scene, cause.target)]
         if not found.index.is_unique or not {*names} <= {*found.index}:

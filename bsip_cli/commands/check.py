@@ -52,7 +52,6 @@ def _about(unit: Unit, person: Participant) -> Iterator[str]:
 
 
 def _trial(unit: Unit, trial: Trial) -> str:
-    """One recording's time, markers and contacts."""
     if not unit.stands("contacts", trial, unit.participant):
         return "refused, see above"
     facts, contacts = unit.facts("markers", trial), unit.read("contacts", trial)

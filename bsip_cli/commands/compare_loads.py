@@ -21,7 +21,7 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.model import TEXTS, Column, Row, Table
 from bsip_cli.report.words import listing, number, segment_label
-from bsip_cli.running.runner import Outcome, held_alone, lacking
+from bsip_cli.running.runner import Outcome, State, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
@@ -41,6 +41,7 @@ _READER = Stage(
     module="bsip_cli.commands.compare_loads",
 )
 _OPTIONS = ("--with", "--without")
+_TEXTS = TEXTS["compare_loads"]
 TWO, LOADED, ALL = "two identifications", "loaded segments", "all"
 
 
@@ -70,27 +71,23 @@ def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, No
         without_loads = unit.config_of_all.model_copy(update={"loads": ()})
         loads_off = Unit(_READER, unit.study, unit.out, without_loads, unit.participant)
         loads_off.messages = unit.messages  # what is said of its recordings is said of both
+        state: State = "done"
+        code = 0
         try:
             with held_alone(unit.out / unit.name):
                 _compared(unit, loads_off, _sets(unit, names))
         except BsipError as error:
             remove(unit.path("load-comparison"))  # an older one would pass for this one
             unit.warn(str(error))
-            said = tuple(unit.messages)
-            yield Outcome(_READER.name, unit.name, "refused", said, error.exit_code)
-        else:
-            yield Outcome(_READER.name, unit.name, "done", tuple(unit.messages))
+            state, code = "refused", error.exit_code
+        yield Outcome(_READER.name, unit.name, state, tuple(unit.messages), code)
 
 
 # --- which recordings -------------------------------------------------------------------------
 
 
 def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]:
-    """The recordings with and without: those named, or of the others that move, by what they carry.
-
-    UsageError: no load is declared that distinguishes them, a name fits no recording or both sets,
-        or the recordings of one set carry different loads.
-    """
+    """Recordings with and without: those named, or of the others that move, by what they carry."""
     ready = unit.trials("kinematics", "wrench")
     moving = [trial for trial in ready if trial.role != "static"]
     named = [_named(unit, *each) for each in zip(_OPTIONS, names, strict=True)]
@@ -118,7 +115,6 @@ def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]
 
 
 def _named(unit: Unit, option: str, given: str) -> list[Trial]:
-    """The recordings of these tasks, or of these names: squat, or squat_run-2."""
     trials, found = unit.person.trials, []
     for name in given.split(",") if given else ():
         fits = [t for t in trials if name in (t.task, t.stem, t.stem.split("_task-")[1])]
@@ -135,7 +131,6 @@ def _named(unit: Unit, option: str, given: str) -> list[Trial]:
 
 
 def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Trial]) -> None:
-    """There are recordings, all with motion and forces, and all carry the same."""
     if not trials:
         raise UsageError(
             f"no recording {option.removeprefix('--')} a declared load has motion and forces",
@@ -162,7 +157,6 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
 
 
 def _carried(unit: Unit, trial: Trial) -> list[dict]:
-    """Segment, mass and position of each load, in any order."""
     return sorted(loads_record(unit, trial), key=str)
 
 
@@ -171,22 +165,19 @@ def _carried(unit: Unit, trial: Trial) -> list[dict]:
 
 def _tables(unit: Unit) -> Iterator[Table]:
     rows, facts = unit.read("load-comparison"), unit.facts("load-comparison")
+    path = unit.path("load-comparison")
     sets = " and ".join(f"{how} ({listed(facts[how])})" for how in ("with", "without"))
     loaded = rows[rows["analysis"] == LOADED]
     if len(loaded):
         may_be_none = (loaded["ci_low"] <= 0) & (loaded["ci_high"] >= 0)
+        masses = loaded[(loaded["quantity"] == "m") & may_be_none]
+        unsure = masses["segment"].map(segment_label)
         yield Table(
             LOADED,
             f"{unit.name}: what was added, if nothing else changed between recordings {sets}.",
             (*_FIRST, _DIFFERENCE, _DECLARED),
             tuple(map(_row, loaded.to_dict("records"))),
-            (
-                TEXTS["compare_loads"]["difference"],
-                *(  # where a load cannot be distinguished from none
-                    TEXTS["compare_loads"]["none"].format(segment=segment_label(segment))
-                    for segment in loaded[(loaded["quantity"] == "m") & may_be_none]["segment"]
-                ),
-            ),
+            (_TEXTS["difference"], *(_TEXTS["none"].format(segment=name) for name in unsure)),
         )
     masses = rows[(rows["analysis"] == TWO) & (rows["quantity"] == "m")]
     yield Table(
@@ -194,10 +185,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
         f"{unit.name}: two identifications ({facts['estimator']}), all segments free.",
         (*_FIRST, _DIFFERENCE, _DECLARED, _EXPECTED),
         tuple(map(_row, masses.to_dict("records"))),
-        (
-            TEXTS["compare_loads"]["expected"],
-            f"First moments and tensors of all segments: {unit.path('load-comparison')}",
-        ),
+        (_TEXTS["expected"], f"First moments and tensors of all segments: {path}"),
     )
 
 
@@ -219,17 +207,13 @@ _EXPECTED = Column(("expected",), "To be expected")
 
 # --- what the parameters gain by the load ---------------------------------------------------------
 
-
 _SHORTEST_S = 0.5
 _Z95 = 1.96
-_Row = tuple[str, str, str, str, float, float, float, float, float]
 
 
 def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[Trial]]) -> None:
-    """Identify from the trials with and from those without, and write the table.
-
-    ``loads_off``: the same unit without the declared loads, which stay in the forces.
-    """
+    """Identify from the trials with and from those without, and write the table. ``loads_off``: the
+    same unit without the declared loads, which stay in the forces."""
     person = person_of(unit)
     skeleton = person.skeleton
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])
@@ -298,23 +282,25 @@ class _Block:
     declared: np.ndarray
     expected: np.ndarray
 
-    def rows(self, segments: Sequence[str]) -> Iterator[_Row]:
+    def _row(
+        self, of: tuple[str, str, str], value: float, variance: float, declared: float, other: float
+    ) -> tuple:
+        half = _Z95 * np.sqrt(variance)
+        return self.analysis, *of, value, value - half, value + half, declared, other
+
+    def rows(self, segments: Sequence[str]) -> Iterator[tuple]:
         """Ten of each segment."""
-        half = _Z95 * np.sqrt(np.diag(self.covariance))
-        for k, value in enumerate(self.phi):
-            unit, quantity = UNITS[k % 10], PARAMETERS[k % 10]
-            interval = (value, value - half[k], value + half[k])
-            known = (self.declared[k], self.expected[k])
-            yield self.analysis, segments[k // 10], quantity, unit, *interval, *known
+        numbers = (self.phi, np.diag(self.covariance), self.declared, self.expected)
+        for k, known in enumerate(zip(*numbers, strict=True)):
+            yield self._row((segments[k // 10], PARAMETERS[k % 10], UNITS[k % 10]), *known)
 
-    def total(self) -> _Row:
+    def total(self) -> tuple:
         """The masses' sum."""
-        value = float(self.phi[::10].sum())
-        half = _Z95 * float(np.sqrt(self.covariance[::10, ::10].sum()))
-        known = (float(self.declared[::10].sum()), float(self.expected[::10].sum()))
-        return self.analysis, ALL, "m", "kg", value, value - half, value + half, *known
+        known = float(self.declared[::10].sum()), float(self.expected[::10].sum())
+        spread = self.covariance[::10, ::10].sum()
+        return self._row((ALL, "m", "kg"), float(self.phi[::10].sum()), spread, *known)
 
-    def centres(self, segments: Sequence[str], origins_m: np.ndarray) -> Iterator[_Row]:
+    def centres(self, segments: Sequence[str], origins_m: np.ndarray) -> Iterator[tuple]:
         """Three of each segment; none of one whose mass may be zero (95 %), which has no centre."""
         for k, segment in enumerate(segments):
             own = slice(10 * k, 10 * k + 10)
@@ -322,8 +308,7 @@ class _Block:
             if abs(phi[0]) <= _Z95 * np.sqrt(covariance[0, 0]) or declared[0] == 0:
                 continue
             jacobian = readable_jacobian(phi)[1:4]
-            half = _Z95 * np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
+            spread = np.diag(jacobian @ covariance @ jacobian.T)
             found, known = (from_phi(x).com_m - origins_m[k] for x in (phi, declared))
             for j, quantity in enumerate(("cx", "cy", "cz")):
-                interval = (found[j], found[j] - half[j], found[j] + half[j])
-                yield self.analysis, segment, quantity, "m", *interval, known[j], known[j]
+                yield self._row((segment, quantity, "m"), found[j], spread[j], known[j], known[j])

@@ -38,7 +38,6 @@ from bsip_cli.study.study import describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
-
 # Of a trial: names of files with their content, and what else the user should know.
 Texts = tuple[dict[str, str], str]
 # Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.
@@ -67,7 +66,6 @@ def folder_of(unit: Unit, to: Path | None) -> Path:
 
 
 def _joints(unit: Unit, _: str) -> Texts:
-    """The artifact, a row per time, method, joint and axis."""
     table = unit.read("joint-moments")
     return {f"{unit.name}_joint-moments.csv": table.to_csv(index=False, float_format="%.9g")}, ""
 
@@ -126,14 +124,11 @@ def _opensim(unit: Unit, model: str) -> Texts:
 
 
 # By what is asked for: who writes it, what that reads, and options.
+_MOTION = "kinematics contacts wrench plates skeleton marker-positions"
 _TABLES: dict[str, tuple[Callable[[Unit, str], Texts], str, str]] = {
     "joints": (_joints, "joint-moments", ""),
     "bids": (_bids, "markers kinematics wrench", "skeleton"),
-    "opensim": (
-        _opensim,
-        "kinematics contacts wrench plates skeleton marker-positions",
-        "skeleton loads joints",
-    ),
+    "opensim": (_opensim, _MOTION, "skeleton loads joints"),
 }
 
 
@@ -184,11 +179,9 @@ def export_session(
     if what == "recording":
         assert to is not None
         return export_recordings(opened, out, to)
-    writers: dict[str, Writer] = {}
-    if what == "model":
-        writers = _writers(request, skeleton)
-    elif what == "opensim":
-        writers = _writers(replace(request, formats=("osim",)), skeleton)
+    formats = {"model": request.formats, "opensim": ("osim",)}
+    models = replace(request, formats=formats.get(what, ()))
+    writers = _writers(models, skeleton) if what in formats else {}
     _, reads, options = _TABLES.get(what, (None, "", ""))
     kinds = tuple(reads.split()), (), tuple(options.split())
     of_trials = Stage("export", "trial", "Tables of a trial.", *kinds)
@@ -214,7 +207,6 @@ def export_session(
 
 
 def _check(request: Request) -> None:
-    """Options that belong together."""
     of_models = request.formats or request.model_file or request.model_bodies
     of_bodies = of_models or request.method or request.repair
     if request.what in ("recording", "bids") and request.to is None:
@@ -230,7 +222,6 @@ def _check(request: Request) -> None:
 
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
-    """Ending of the file and who writes it, for every format that is asked for."""
     formats = dict.fromkeys(request.formats or FORMATS)
     writers: dict[str, Writer] = {
         FORMATS[name][0]: partial(lambda text_of, body: (text_of(body), ""), FORMATS[name][1])
@@ -279,10 +270,8 @@ def _given_model(
 def _export(
     unit: Unit, skeleton: Skeleton, request: Request, writers: dict[str, Writer]
 ) -> tuple[str, Outcome]:
-    """All files of one participant; a format that cannot be written does not stop the others.
-
-    Returns the last file's name, too.
-    """
+    """All files of one participant, and the last one's name; a format that cannot be written does
+    not stop the others."""
     if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
         return "", waiting
     folder = folder_of(unit, request.to)
@@ -292,11 +281,9 @@ def _export(
     try:
         with held_alone(unit.out / unit.name):
             method, why = (request.method, "") if request.method else _chosen(unit)
-            notes += [why] if why else []
-            body = _identified(unit, skeleton, method)
-            known = len(body.made_of)
-            body = body.repaired() if request.repair else body
-            notes += body.made_of[known:]
+            as_found = _identified(unit, skeleton, method)
+            body = as_found.repaired() if request.repair else as_found
+            notes += [*([why] if why else []), *body.made_of[len(as_found.made_of) :]]
             for ending, writer in writers.items():
                 path = folder / f"{body.name}{ending}"
                 try:
@@ -318,10 +305,7 @@ def _export(
 
 
 def _chosen(unit: Unit) -> tuple[str, str]:
-    """The method that `bsip choose` found best over all movements, and why.
-
-    UsageError: It has not chosen, or of an earlier identification.
-    """
+    """The method that `bsip choose` found best over all movements, and why."""
     path = unit.path("choice")
     if not path.exists() or not is_made_from(path, unit.path("identification")):
         raise UsageError(
@@ -335,11 +319,7 @@ def _chosen(unit: Unit) -> tuple[str, str]:
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:
-    """The participant's geometry and one method's inertias, as the artifacts have them.
-
-    UsageError: There is no such method.
-    BadDataError: The tables belong to another skeleton, or hold no numbers.
-    """
+    """The participant's geometry and one method's inertias, as the artifacts have them."""
     tables = {kind: unit.read(kind) for kind in _READER.reads}
     rows = tables["bsip"]
     methods = [name for name in dict.fromkeys(rows["method"]) if _FILE_NAME.fullmatch(name)]
@@ -363,13 +343,10 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
     paths = (unit.path(kind) for kind in _READER.reads)
     head = f"bsip {__version__} export: participant {unit.name}, method {method}"
     made_of = (head, *(f"{path.name} sha256 {file_hash(path)}" for path in paths))
-    return IdentifiedPerson(
-        person, tuple(from_readable(row) for row in values), unit.name, method, made_of
-    )
+    return IdentifiedPerson(person, tuple(map(from_readable, values)), unit.name, method, made_of)
 
 
 def _in_order(unit: Unit, kind: str, rows: pd.DataFrame, segments: tuple[str, ...]) -> pd.DataFrame:
-    """Rows in the order of these segments of the skeleton."""
     if sorted(rows["segment"]) != sorted(segments):
         raise BadDataError(
             "its segments are not those of the skeleton",
@@ -377,5 +354,4 @@ def _in_order(unit: Unit, kind: str, rows: pd.DataFrame, segments: tuple[str, ..
             expected=f"each of {', '.join(segments)} once",
             remedy="name the skeleton that the results were made with, or run the stages again",
         )
-    ordered = rows.set_index("segment").loc[list(segments)]
-    return ordered.reset_index()
+    return rows.set_index("segment").loc[list(segments)].reset_index()

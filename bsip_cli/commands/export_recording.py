@@ -41,20 +41,12 @@ from bsip_cli.stages.frames import markers_from, person_of
 from bsip_cli.stages.survey import opened, reading_of
 from bsip_cli.stages.trial_scene import plates_of
 
+_OF_TRIALS = ("readings", "markers", "wrench", "plates", "marker-events")
 _READER = Stage(
     "export",
     "trial",
     "The recording without its named faults.",
-    reads=(
-        "readings",
-        "markers",
-        "wrench",
-        "plates",
-        "marker-events",
-        "skeleton",
-        "marker-positions",
-        "overall-diagnosis",
-    ),
+    reads=(*_OF_TRIALS, "skeleton", "marker-positions", "overall-diagnosis"),
     writes=(),
     options=("skeleton", "ingest"),
     reads_if_there=("laboratory",),
@@ -130,10 +122,7 @@ def _corrected(unit: Unit, folder: Path) -> Outcome:
 
 
 class _Correction:
-    """What is done to one recording.
-
-    ``said`` : what is corrected, a sentence each. ``left`` : what is not, and why.
-    """
+    """What is done to a recording. ``said``: what is corrected; ``left``: what is not, and why."""
 
     def __init__(self, unit: Unit) -> None:
         self.unit, self.left = unit, list[str]()
@@ -182,9 +171,8 @@ class _Correction:
             f"{sentence}: its signal is not known exactly"
             for sentence in named.said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
         )
-        about = (
-            named.of_the_laboratory(unit, "named", "ambiguous") if self._plates else diagnosis[:0]
-        )
+        verdicts = ("named", "ambiguous")
+        about = named.of_the_laboratory(unit, *verdicts) if self._plates else diagnosis[:0]
         self.left += dict.fromkeys(
             f"{sentence}: {named.why_left(effect, 'no size of it is known for this recording')}"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
@@ -210,35 +198,25 @@ class _Correction:
     @property
     def said(self) -> list[str]:
         """Repairs of plates, faults of plates and clocks with their sizes, and exchanged labels."""
-        last, cut = self._opened.recording.n_frames, self._kept
-        return [
-            *(
-                f"plate {name}: {replace(reading, turn=0, mirrored=False, place_of='').words()}"
-                for name, reading in self._plates.items()
-                if _stated(reading) != reading
-            ),
-            *(
-                f"plate {name}: forces and moments divided by {gain:.4g}"
-                for name, gain in self._gains.items()
-                if name in self._plates
-            ),
-            *(
-                f"plate {name}: its reading without load, "
-                f"({', '.join(f'{x:.1f}' for x in zero[:3])}) N, subtracted"
-                for name, zero in self._zeros.items()
-                if is_noticed(zero)
-            ),
-            *(named.words_of(*x, self._scene, self._diagnosis) for x in self.causes.items()),
-            *(
-                f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
-                for a, b, start, end in self._swaps
-            ),
-            *(
-                f"frames left out at the {end}, whose forces were not recorded: {n}"
-                for n, end in ((cut.start, "beginning"), (last - cut.stop, "end"))
-                if n
-            ),
-        ]
+        last, cut, said = self._opened.recording.n_frames, self._kept, []
+        for name, reading in self._plates.items():
+            if _stated(reading) != reading:
+                repaired = replace(reading, turn=0, mirrored=False, place_of="")
+                said.append(f"plate {name}: {repaired.words()}")
+        for name, gain in self._gains.items():
+            if name in self._plates:
+                said.append(f"plate {name}: forces and moments divided by {gain:.4g}")
+        for name, zero in self._zeros.items():
+            if is_noticed(zero):
+                force = ", ".join(f"{x:.1f}" for x in zero[:3])
+                said.append(f"plate {name}: its reading without load, ({force}) N, subtracted")
+        said += [named.words_of(*x, self._scene, self._diagnosis) for x in self.causes.items()]
+        for a, b, start, stop in self._swaps:
+            said.append(f"labels {a} and {b} exchanged from {start:.3f} to {stop:.3f} s")
+        for n, end in ((cut.start, "beginning"), (last - cut.stop, "end")):
+            if n:
+                said.append(f"frames left out at the {end}, whose forces were not recorded: {n}")
+        return said
 
     def of(self, before: Instruments) -> Instruments:
         """The instruments corrected."""
@@ -290,11 +268,9 @@ class _Correction:
 
     @cached_property
     def _plates(self) -> dict[str, PlateReading]:
-        """How the plates that count are understood."""
-        found = {s.name: self._session.plates.get(s.name, Verdict()) for s in self._opened.sources}
-        return {
-            name: one.reading for name, one in found.items() if not (one.refusal or one.repeats)
-        }
+        names = [source.name for source in self._opened.sources]
+        found = {name: self._session.plates.get(name, Verdict()) for name in names}
+        return {n: one.reading for n, one in found.items() if not (one.refusal or one.repeats)}
 
     def _wrench(self, name: str, reading: PlateReading) -> np.ndarray:
         by_name = {one.name: one for one in self._opened.sources}
@@ -351,11 +327,9 @@ class _Correction:
     # --- axes and labels ------------------------------------------------------------------------
 
     def _turns(self, *, markers: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes.
-
-        Where the vertical is tilted both are turned, about the middle of the plates, lest the
-        surfaces, whose places in the file stay, come to lie under or over what stands on them.
-        """
+        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes:
+        where the vertical is tilted both, about the middle of the plates, lest the surfaces, whose
+        places in the file stay, come to lie under or over what stands on them."""
         for cause in self.causes:
             tilted = isinstance(cause.effect, GravityTilt)
             if tilted or (markers and isinstance(cause.effect, Turned)):
@@ -385,9 +359,8 @@ class _Correction:
 
 def _stated(reading: PlateReading) -> PlateReading:
     """Without the repairs that other numbers in the channels make needless."""
-    return replace(
-        reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
-    )
+    plain = replace(reading, moment_scale=1.0, point_scale=1.0)
+    return replace(plain, about="stated", channels="", centre_m=None)
 
 
 def _in_reading(
@@ -419,9 +392,8 @@ def _in_reading(
 def _at(times_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """(N, ...) values (n, ...) of times (n,) at others (N,), on lines between them."""
     ends = (values[0], values[-1])
-    return np.asarray(
-        interp1d(known_s, values, axis=0, bounds_error=False, fill_value=ends)(times_s)
-    )
+    between = interp1d(known_s, values, axis=0, bounds_error=False, fill_value=ends)
+    return np.asarray(between(times_s))
 
 
 def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:

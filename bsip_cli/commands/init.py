@@ -22,12 +22,12 @@ from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
 from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
+from bsip_cli.report.blocks import environment
 from bsip_cli.study import participants
 from bsip_cli.study.new_study import Named, counted, is_sequence, name_all, plain
 from bsip_cli.study.trials import listed
 
 # --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
-
 
 _NAMES = ("participants", "subjects")
 _KINDS = (".tsv", ".csv")
@@ -61,26 +61,18 @@ def read_tables(
             if name is None or name in said:
                 continue
             try:
-                stated, notes_of_row = _stated(replace(row, id=name), table)
+                person = participants.participant_of(replace(row, id=name), table)
             except BadDataError as refusal:
                 notes.append(str(refusal))
                 continue
-            said[name] = file, stated
-            notes += notes_of_row
+            is_stated = row.cells[table.columns["sex"].index].casefold() not in participants.UNKNOWN
+            sex = person.sex if is_stated else ""
+            said[name] = file, StatedPerson(person.mass_kg, person.height_m, sex)
+            notes += person.notes
     return said, notes
 
 
-def _stated(
-    row: participants.Row, table: participants.PeopleTable
-) -> tuple[StatedPerson, tuple[str, ...]]:
-    person = participants.participant_of(row, table)
-    is_stated = row.cells[table.columns["sex"].index].casefold() not in participants.UNKNOWN
-    stated = StatedPerson(person.mass_kg, person.height_m, person.sex if is_stated else "")
-    return stated, person.notes
-
-
 # --- the marker set of a study that ``bsip init`` makes: a shipped one, or one of the labels ------
-
 
 STARTER = "markers.toml"
 
@@ -122,7 +114,6 @@ def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> Stu
 
 
 def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
-    """A first set of all labels, those of static trials first."""
     order = sorted(sources, key=lambda source: named[source.path].task != "static")
     labels = dict.fromkeys(label for source in order for label in source.written)
     try:
@@ -155,6 +146,10 @@ class _Plan:
     tables: tuple[Path, ...]
     notes: tuple[str, ...]
 
+    @property
+    def made(self) -> str:
+        return "linked" if self.link else "copied"
+
 
 def init_command(given: tuple[Path, ...], out: Path, participant: str, link: bool) -> int:
     """Make the study, and print what lies where and what was not used.
@@ -185,7 +180,9 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
             "no recording can be used" if unused else "no files",
             file=", ".join(map(str, given)),
             expected="C3D files, or TRC files with their MOT or STO next to them",
-            remedy=_remedy(unused),
+            remedy="correct what is said of each"
+            if any(one.why != NO_RECORDING for one in unused)
+            else "export the trials so, or name the folder they lie in",
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
@@ -193,12 +190,6 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
     _write(plan)
     _say(_in_words(plan))
     return 3 if any(one.is_fault for one in unused) else 0
-
-
-def _remedy(unused: Sequence[Unused]) -> str:
-    if any(one.why != NO_RECORDING for one in unused):
-        return "correct what is said of each"
-    return "export the trials so, or name the folder they lie in"
 
 
 def _check_out(out: Path) -> None:
@@ -287,7 +278,6 @@ def _write(plan: _Plan) -> None:
 
 
 def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
-    """Each file that is used, where it goes in the study, and what it is of."""
     for source in plan.sources:
         named = plan.named[source.path]
         for path in filter(None, (source.path, source.forces)):
@@ -296,9 +286,9 @@ def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
 
 def _source_rows(plan: _Plan) -> Iterator[tuple[str, ...]]:
     yield _COLUMNS
-    made = "linked" if plan.link else "copied"
     for source, target, named in _files(plan):
-        yield str(target), str(source.absolute()), made, named.participant, named.task, ""
+        place = str(target), str(source.absolute()), plan.made
+        yield *place, named.participant, named.task, ""
     for table in plan.tables:
         yield "participants.tsv", str(table.absolute()), "read", "n/a", "n/a", ""
     for one in sorted(plan.unused, key=lambda one: one.path):
@@ -314,26 +304,11 @@ def _table(rows: Iterable[tuple[str, ...]]) -> str:
 
 def _study_toml(plan: _Plan) -> str:
     tasks = sorted({named.task for named in plan.named.values()})
-    sequences = [task for task in tasks if is_sequence(task)]
-    roles = ", ".join(f'"{task}"' for task in sequences or ["sequence"])
-    about = "" if sequences else "  # none here: the trial with most contacts on plates identifies"
-    lines = [
-        "# Made by bsip init; configs/default.toml lists every option with its unit.",
-        f'marker_set = "{plan.markers.name}"',
-        "",
-        "[roles]",
-        'static = ["static"]',
-        f"sequence = [{roles}]{about}",
-    ]
+    sequences = ", ".join(f'"{task}"' for task in tasks if is_sequence(task))
     moving = Counter(n.participant for n in plan.named.values() if n.task != "static")
-    if moving and max(moving.values()) == 1 and not sequences:
-        lines += [
-            "",
-            "# Nobody has a second movement to validate with: parts of the only one are held out.",
-            "[identify]",
-            "hold_out_fraction = 0.4",
-        ]
-    return "\n".join(lines) + "\n"
+    alone = set(moving.values()) == {1} and not sequences
+    known = {"marker_set": plan.markers.name, "sequences": sequences, "alone": alone}
+    return environment().get_template("study.toml.j2").render(known)
 
 
 # --- what is said ---------------------------------------------------------------------------------
@@ -361,8 +336,7 @@ def _in_words(plan: _Plan) -> Iterator[str]:
     yield f"marker set: {plan.markers.name}"
     yield from plan.notes
     yield from _unused_lines(plan.unused)
-    files = "linked" if plan.link else "copied"
-    yield f"{len([*_files(plan)])} files {files}; sources.tsv says what came from where"
+    yield f"{len([*_files(plan)])} files {plan.made}; sources.tsv says what came from where"
     results = plan.out / "derivatives" / "bsip"
     yield f"next: bsip run {quote(str(plan.out))} --out {quote(str(results))}"
 

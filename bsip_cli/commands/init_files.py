@@ -106,8 +106,8 @@ def read_sources(
             twin = hashes.setdefault(file_hash(one.path), one.path)
             if twin != one.path:
                 unused.append(Unused(one.path, f"holds the same as {twin.name}"))
-            elif one.kind == ".trc" and (containers := _forces_of(one, files)):
-                why = f"{containers[0].path.name}, of the same name, is used"
+            elif one.kind == ".trc" and (container := _container_of(one, files)):
+                why = f"{container.path.name}, of the same name, is used"
                 unused.append(Unused(one.path, why))
             else:
                 kept.append(_source(one, files, unused))
@@ -121,13 +121,11 @@ def read_sources(
 
 
 def _why(refusal: BadDataError) -> str:
-    remedy = f"; {refusal.remedy}" if refusal.remedy else ""
-    expected = f"; expected {refusal.expected}" if refusal.expected else ""
-    return f"{refusal.found}{expected}{remedy}"
+    expected = f"expected {refusal.expected}" if refusal.expected else ""
+    return "; ".join(filter(None, (refusal.found, expected, refusal.remedy)))
 
 
 def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unused:
-    """Why a file that is no recording is left where it is."""
     inner = Path(one.path.stem.removesuffix(".tar")).suffix.lower()
     if one.kind in PACKED and inner in (*RECORDINGS, *ENDINGS):
         return Unused(one.path, "is packed: unpack it", is_fault=True)
@@ -145,16 +143,11 @@ def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unus
 # --- which files are of one trial, by their names and places --------------------------------------
 
 
-def _forces_of(trc: Listed, files: Sequence[Listed]) -> list[Listed]:
+def _container_of(trc: Listed, files: Sequence[Listed]) -> Listed | None:
     """The C3D of its name in its folder, which holds markers and forces."""
-    own = trc.path.with_suffix("")
-    return [
-        one
-        for one in files
-        if one.kind == ".c3d"
-        and one.path.parent == own.parent
-        and one.path.stem.casefold() == own.name.casefold()
-    ]
+    own = trc.path.parent, trc.path.stem.casefold()
+    near = (one for one in files if (one.path.parent, one.path.stem.casefold()) == own)
+    return next((one for one in near if one.kind == ".c3d"), None)
 
 
 def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
@@ -165,15 +158,15 @@ def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
 def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
     """Those of its name that lie next to a file, else in the deepest folder that holds both."""
     name = trial_words(one.path)
-    near = {other: _nearness(one, other) for other in others if trial_words(other.path) == name}
-    return [other for other, nearness in near.items() if nearness == max(near.values())]
 
+    def nearness(other: Listed) -> int:
+        if one.path.parent == other.path.parent:
+            return len(one.path.parts)
+        pairs = zip(one.folders, other.folders, strict=False)
+        return next((k for k, (a, b) in enumerate(pairs) if a != b), 0)
 
-def _nearness(one: Listed, other: Listed) -> int:
-    if one.path.parent == other.path.parent:
-        return len(one.path.parts)
-    pairs = zip(one.folders, other.folders, strict=False)
-    return next((k for k, (a, b) in enumerate(pairs) if a != b), 0)
+    near = {other: nearness(other) for other in others if trial_words(other.path) == name}
+    return [other for other, k in near.items() if k == max(near.values())]
 
 
 def trial_words(path: Path) -> tuple[str, ...]:
@@ -186,7 +179,6 @@ def trial_words(path: Path) -> tuple[str, ...]:
 
 
 def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Source:
-    """Read a recording as it will lie in the study."""
     forces = None
     if one.kind == ".trc":
         # tables of its name, from the nearest folder that has one, which no other TRC has
@@ -239,15 +231,14 @@ def _with_forces(
         names = " and ".join(path.name for path in tables)
         why = f"{names} are both forces of {one.path.name}: which are meant is not guessed"
         unused += [Unused(path, why, is_fault=True) for path in tables]
-        tables = ()
-    if tables:
-        try:
-            return _read_pair(one.path, tables[0]), tables[0]
-        except BadDataError as refusal:
-            recording = _read_pair(one.path, None)  # if it is the markers, this refuses
-            unused.append(Unused(tables[0], _why(refusal), is_fault=True))
-            return recording, None
-    return _read_pair(one.path, None), None
+    if len(tables) != 1:
+        return _read_pair(one.path, None), None
+    try:
+        return _read_pair(one.path, tables[0]), tables[0]
+    except BadDataError as refusal:
+        recording = _read_pair(one.path, None)  # if it is the markers, this refuses
+        unused.append(Unused(tables[0], _why(refusal), is_fault=True))
+        return recording, None
 
 
 def _read_pair(trc: Path, forces: Path | None) -> Recording:

@@ -34,12 +34,8 @@ def markers_command(file: Path, marker_set: str, prefix: str, write: Path | None
     recording = read_recording(file)
     size = f"{len(recording.labels)} markers, {recording.n_frames} frames"
     corrected = [one for one in recording.findings if one.check in ("labels", "points")]
-    _say(
-        [
-            f"{file}: {size} at {recording.marker_rate_hz:g} Hz",
-            *(f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected),
-        ]
-    )
+    done = [f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected]
+    _say([f"{file}: {size} at {recording.marker_rate_hz:g} Hz", *done])
     guess, chosen = _chosen(recording, marker_set, prefix)
     complete = bool(chosen.markers) and _compared(recording, chosen, prefix)
     if not chosen.markers:
@@ -53,13 +49,9 @@ def _compared(recording: Recording, chosen: MarkerSet, prefix: str) -> bool:
     """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
     labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, prefix)
     _say([finding.sentence() for finding in paired])
-    match = match_labels(
-        labels,
-        chosen.wanted(),
-        optional=chosen.optional(),
-        seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
-        prefix=prefix,
-    )
+    seen = np.isfinite(recording.markers_m[..., 0]).any(axis=0)
+    how = {"optional": chosen.optional(), "seen": seen, "prefix": prefix}
+    match = match_labels(labels, chosen.wanted(), **how)
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
     words = {}
     for k, marker in there.items():
@@ -88,7 +80,6 @@ def _say(lines: Sequence[str]) -> None:
 
 
 def _chosen(recording: Recording, marker_set: str, prefix: str) -> tuple[Guess | None, MarkerSet]:
-    """The set that was named, else the one that the labels fit; says which."""
     if marker_set != "auto":
         chosen = load_marker_set(marker_set)
         _say(["", f"marker set: {chosen.name} ({chosen.description}), as asked"])
@@ -153,14 +144,10 @@ def _segment_rows(
 
 
 def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
-    """Write the labels of the file as a marker set; never over a file that is there.
-
-    UsageError: the file that was asked for is there, or cannot be written.
-    """
+    """Write the labels of the file as a marker set; never over a file that is there."""
     target = write or Path(f"{file.stem.replace(' ', '_')}_markers.toml")
-    text = starter_toml(
-        guess.marker_set, guess.unknown, printable(file.name), printable(target.name)
-    )
+    names = printable(file.name), printable(target.name)
+    text = starter_toml(guess.marker_set, guess.unknown, *names)
     try:
         with target.open("x", encoding="utf-8") as handle:
             handle.write(text)
@@ -176,10 +163,5 @@ def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
     except OSError as error:
         raise UsageError(f"cannot be written ({error.strerror})", file=target) from None
     again = f"bsip markers {quote(str(file))} --marker-set {quote(str(target))}"
-    _say(
-        [
-            "",
-            f"wrote {target}: a first marker set, guessed from the labels; correct it, check it "
-            f"with `{again}`, and name it in study.toml",
-        ]
-    )
+    said = f"wrote {target}: a first marker set, guessed from the labels; correct it, check it "
+    _say(["", f"{said}with `{again}`, and name it in study.toml"])

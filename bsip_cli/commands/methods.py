@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
+from bsip_cli.report.blocks import environment
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.records import flat
 from bsip_cli.report.words import TEXTS, listing
@@ -38,13 +38,7 @@ def methods_text(out: Path) -> str:
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
-    environment = Environment(
-        loader=PackageLoader("bsip_cli.report"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    text = environment.get_template("methods.txt.j2").render(study=study)
+    text = environment().get_template("methods.txt.j2").render(study=study)
     paragraphs = (" ".join(part.split()) for part in text.split("\n\n"))
     return "\n\n".join(part for part in paragraphs if part)
 
@@ -76,7 +70,6 @@ class _Results:
 
     @cached_property
     def _made(self) -> list[Mapping[str, Any]]:
-        """Who made the artifacts, one of each kind and person or trial."""
         kinds = (*_WITH_OPTIONS, *_LATER)
         files = (path for kind in kinds for path in self._files(kind))
         return [read_header(path)["provenance"]["made_by"] for path in files]

@@ -74,16 +74,11 @@ def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -
             values = sizes["estimate"].to_numpy()
             cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
             shared.append(cause)
-    there = {"", ALL, *plates}
-    return [
-        *here,
-        *(
-            one
-            for one in shared
-            if one.target.split(" ")[0]
-            in (there - {*zeroed} if isinstance(one.effect, PlateZero) else there)
-        ),
-    ]
+    for one in shared:
+        gone = zeroed if isinstance(one.effect, PlateZero) else ()
+        if one.target.split(" ")[0] in {"", ALL, *plates} - {*gone}:
+            here.append(one)
+    return here
 
 
 def of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
@@ -117,9 +112,8 @@ def alike(cause: Cause, diagnosis: pd.DataFrame) -> list[tuple[str, str]]:
 def said_of(trial: str, diagnosis: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
     """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
     here = np.array([trial in names.split(", ") for names in diagnosis["trials"]], dtype=bool)
-    return diagnosis[
-        here & diagnosis["effect"].isin(effects) & (diagnosis["verdict"] != "rejected")
-    ]
+    is_named = diagnosis["verdict"] != "rejected"
+    return diagnosis[here & diagnosis["effect"].isin(effects) & is_named]
 
 
 def words_of(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -> str:
@@ -130,9 +124,8 @@ def words_of(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -
         factor, readable = readable_unit(name, unit)
         mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's own
         nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
-        low, high = (
-            factor * (nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL)[0]
-        )
+        known = nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL
+        low, high = factor * known[0]
         size, interval = f"{factor * value:.3g}", ""
         if high > low:
             size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))

@@ -18,7 +18,7 @@ from bsip_cli.report.candidates import analysed, candidates_of, causes_of, effec
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.errors import use_sentence
-from bsip_cli.report.participant.errors import largest_changes, moment_change
+from bsip_cli.report.participant.errors import largest_changes, moment_change, peaks_of
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of
@@ -93,7 +93,6 @@ def _folders(out: Path) -> list[Path]:
 
 
 def _notes(out: Path, kind: str, *columns: str) -> Iterator[str]:
-    """What an artifact says of each person, if anything."""
     for folder in _folders(out):
         try:
             table = _table(folder, kind)
@@ -105,7 +104,6 @@ def _notes(out: Path, kind: str, *columns: str) -> Iterator[str]:
 
 
 def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | None:
-    """What was searched in a participant's recordings and what came out, in words."""
     diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
     if diagnosis is None or detection is None:
         return None
@@ -118,10 +116,10 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
     light, large, _ = _of_the_page(folder)
     found = verdict_of(diagnosis, detection, gains, changes, budget, large)
     right = corrected_sentence(_of_trials(folder, "marker-events"))
-    if light:
-        found = replace(found, headline=f"{light.title}. {light.text}")
-    changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
-    found = replace(found, results=(*found.results, *changed))
+    headline = f"{light.title}. {light.text}" if light else found.headline
+    peaks = peaks_of(_of_trials(folder, "joint-peaks"))
+    changed = tuple(f"{said}." for said in largest_changes(peaks))
+    found = replace(found, headline=headline, results=(*found.results, *changed))
     return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
 
@@ -138,11 +136,11 @@ def _findings(
     if not alone:
         return
     causes = causes_of(candidates_of(diagnosis))
-    everywhere, peaks = analysed(detection, diagnosis), _peaks(folder)
+    everywhere = analysed(detection, diagnosis)
+    peaks = peaks_of(_of_trials(folder, "joint-peaks"))
     shown_here = causes[: _MOST - len(large)]
-    lines = [*large]
-    lines += [cause_line(c, everywhere, moment_change(c, causes, peaks)) for c in shown_here]
-    for number, line in enumerate(lines, start=1):
+    lines = [cause_line(c, everywhere, moment_change(c, causes, peaks)) for c in shown_here]
+    for number, line in enumerate((*large, *lines), start=1):
         yield _wrapped(line, f"{number:2d}. ")
     if more := len(causes) - len(shown_here):
         yield f"  - {count(more, 'more finding')}: --full"
@@ -166,14 +164,7 @@ def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], str]:
     return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("first", "")
 
 
-def _peaks(folder: Path) -> pd.DataFrame:
-    """Joint peaks of all recordings, with a column ``trial``."""
-    peaks = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
-    return pd.concat(peaks, ignore_index=True) if peaks else pd.DataFrame()
-
-
 def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:
-    """Stems of the trials and their artifacts of a kind."""
     ending = f"_{SCHEMAS[kind].file_name}.parquet"
     paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
     return [(path.name.removesuffix(ending), read_artifact(path, kind)) for path in paths]
@@ -201,8 +192,7 @@ def verdict_text(
     """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
     what was corrected before."""
     lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, "", columns)]
-    for number, cause in enumerate(found.causes, start=1):
-        lines.append(_wrapped(cause, f"{number:2d}. ", columns))
+    lines += [_wrapped(one, f"{k:2d}. ", columns) for k, one in enumerate(found.causes, start=1)]
     rest = (*right, *found.results, *found.advice, found.limits)
     lines += [_wrapped(text, "  - ", columns) for text in rest if text]
     return "\n".join(lines)

@@ -193,7 +193,6 @@ def _footer(file) -> tuple[int, bytes]:
 
 
 def _digest(file, until: int):
-    """SHA-256 of the first bytes."""
     digest = hashlib.sha256()
     file.seek(0)
     while until > 0:

@@ -80,13 +80,9 @@ def forces_beside(trc: Path) -> Path | None:
 
     BadDataError: there are several, and which one is meant cannot be known.
     """
-    own = trc.stem.casefold()
-    found = [
-        path
-        for path in entries(trc.parent)
-        if path.suffix.lower() in ENDINGS
-        if own in (path.stem.casefold(), trial_stem(path).casefold())
-    ]
+    own, tables = trc.stem.casefold(), entries(trc.parent)
+    tables = [path for path in tables if path.suffix.lower() in ENDINGS]
+    found = [p for p in tables if own in (p.stem.casefold(), trial_stem(p).casefold())]
     if len(found) > 1:
         raise BadDataError(
             f"there are {' and '.join(printable(path.name) for path in found)} next to it",

@@ -78,10 +78,15 @@ def read_toml(file: Path) -> dict:
         _check_values(content)
     except OSError as error:
         raise UsageError(f"cannot be read ({error.strerror or error})", file=file) from None
-    except RecursionError:
-        raise _not_toml(file, "brackets in brackets without end") from None
-    except ValueError as error:  # tomllib's, no UTF-8, a number of more digits than Python reads
-        raise _not_toml(file, str(error)) from None
+    except (RecursionError, ValueError) as error:
+        # ValueError: tomllib's, no UTF-8, a number of more digits than Python reads
+        endless = isinstance(error, RecursionError)
+        raise UsageError(
+            f"not valid TOML ({'brackets in brackets without end' if endless else error})",
+            file=file,
+            expected="TOML in UTF-8",
+            remedy="correct that place",
+        ) from None
     return content
 
 
@@ -94,15 +99,6 @@ def _check_values(value: object, depth: int = 0) -> None:
     parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     for part in parts:
         _check_values(part, depth + 1)
-
-
-def _not_toml(file: Path, why: str) -> UsageError:
-    return UsageError(
-        f"not valid TOML ({why})",
-        file=file,
-        expected="TOML in UTF-8",
-        remedy="correct that place",
-    )
 
 
 def shipped(*parts: str) -> Path:
@@ -163,13 +159,18 @@ def read_text_table(file: Path, known: Callable[[Sequence[str]], int]) -> TextTa
 
 
 def _text(file: Path) -> tuple[str, str]:
-    if fault := fault_of(file):
-        raise _unreadable(file, f"cannot be read: it {fault}")
+    why = f": it {fault}" if (fault := fault_of(file)) else ""
     try:
-        with file.open("rb") as handle:
-            raw = handle.read()
+        raw = b"" if why else file.read_bytes()
     except OSError as error:
-        raise _unreadable(file, f"cannot be read ({error.strerror or error})") from None
+        why = f" ({error.strerror or error})"
+    if why:
+        raise BadDataError(
+            f"cannot be read{why}",
+            file=file,
+            expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
+            remedy="write one, a line per participant",
+        )
     even, odd = raw[::2].count(0), raw[1::2].count(0)
     encoding = next((name for mark, name in _BOMS.items() if raw.startswith(mark)), "utf-8")
     if encoding == "utf-8" and min(even, odd) == 0 and max(even, odd) > _MOSTLY_ZERO * len(raw):
@@ -184,7 +185,6 @@ def _text(file: Path) -> tuple[str, str]:
 
 
 def _header(line: str, known: Callable[[Sequence[str]], int]) -> tuple[tuple[str, ...], str]:
-    """The cells of the first line, and what separates them; tabs where nothing says otherwise."""
     best: tuple[int, tuple[str, ...], str] = (-1, (), "tabs")
     for separator in (*_SEPARATORS.values(), *_BLANKS):
         try:
@@ -208,15 +208,6 @@ def _cells(text: str, separator: str) -> Iterator[list[str]]:
         separator = "tabs"
     sign = next(sign for sign, word in _SEPARATORS.items() if word == separator)
     yield from csv.reader(io.StringIO(text, newline=""), delimiter=sign)
-
-
-def _unreadable(file: Path, found: str) -> BadDataError:
-    return BadDataError(
-        found,
-        file=file,
-        expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
-        remedy="write one, a line per participant",
-    )
 
 
 def _no_text(file: Path, why: str) -> BadDataError:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from html import unescape
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
@@ -234,7 +234,6 @@ class Document:
 
 # --- a document as one self-contained HTML page ---------------------------------------------------
 
-
 FILES = "figures"  # folder next to the page that holds its figures and the numbers behind them
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -243,17 +242,16 @@ _TEMPLATES = Path(__file__).parent / "templates"
 @cache
 def _template() -> Template:
     """All texts in it are escaped."""
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        finalize=_cleaned,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
-    environment.filters["tied"] = _tied
-    return environment.get_template("report.html.j2")
+    pages = environment(autoescape=True, finalize=_cleaned)
+    pages.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
+    pages.filters["tied"] = _tied
+    return pages.get_template("report.html.j2")
+
+
+def environment(**more: Any) -> Environment:
+    """Of all templates of bsip."""
+    more |= {"trim_blocks": True, "lstrip_blocks": True}
+    return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **more)
 
 
 def render(document: Document) -> str:

@@ -33,10 +33,7 @@ def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tupl
 
 
 def overall_pieces(
-    budget: pd.DataFrame,
-    found: Collection[str],
-    trial: str = "",
-    components: Sequence[str] = FIRST,
+    budget: pd.DataFrame, found: Collection[str], trial: str = "", components: Sequence[str] = FIRST
 ) -> tuple[Piece, ...]:
     """The same of the mean over the vertical force and both directions of the centre of pressure,
     as far as their errors are of interest; terms that look alike in one count together in all, and
@@ -131,7 +128,6 @@ def _unknown(parts: Sequence[tuple[str, float]]) -> Iterator[Piece]:
 
 
 def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
-    """Terms that stand in for each other are one group."""
     left = [term for term in rows.index if term != "total"]
     while left:
         group = [left[0]]
@@ -170,29 +166,25 @@ def _total(budget: pd.DataFrame, component: str, trial: str = "") -> pd.Series |
     return None if rows.empty else rows.iloc[0]
 
 
-def budget_sentences(budget: pd.DataFrame, found: Collection[str]) -> tuple[str, ...]:
+def budget_sentences(budget: pd.DataFrame, found: Collection[str]) -> Iterator[str]:
     """What makes RM's error in all trials together, one component each, and what that is worth on
     data held out."""
-    return tuple(filter(None, (_sentence(budget, component, found) for component in FIRST)))
-
-
-def _sentence(budget: pd.DataFrame, component: str, found: Collection[str]) -> str:
-    size, unit = size_of(budget, component)
-    total = _total(budget, component)
-    if total is None or not size >= LEAST_REPORTED_SIZE:
-        return ""
-    shares = pieces(budget, component, found)
-    parts = [f"{_with(one, one.perhaps).label} {number(one.share, 0)} %" for one in shares]
-    worth = ""
-    if np.isfinite(total["gain_percent"]):
-        change, low, high = (
-            signed(-total[name], 0) for name in ("gain_percent", "gain_high", "gain_low")
+    for component in FIRST:
+        size, unit = size_of(budget, component)
+        total = _total(budget, component)
+        if total is None or not size >= LEAST_REPORTED_SIZE:
+            continue
+        shares = pieces(budget, component, found)
+        parts = [f"{_with(one, one.perhaps).label} {number(one.share, 0)} %" for one in shares]
+        worth = ""
+        if np.isfinite(total["gain_percent"]):
+            change = signed(-total["gain_percent"], 0)
+            low, high = signed(-total["gain_high"], 0), signed(-total["gain_low"], 0)
+            worth = (
+                " Put into the model with their sizes in other data, all of them change the error "
+                f"by {change} % ({low} to {high} %)."
+            )
+        yield (
+            f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
+            f"{listing(parts)}.{worth}"
         )
-        worth = (
-            " Put into the model with their sizes in other data, all of them change the error by "
-            f"{change} % ({low} to {high} %)."
-        )
-    return (
-        f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
-        f"{listing(parts)}.{worth}"
-    )

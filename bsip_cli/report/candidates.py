@@ -76,8 +76,8 @@ class Candidate(Judged):
         """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
         size, usual = self.main_number(), effect_words.USUAL.get(self.effect)
         if size is None or usual is None or self.effect in effect_words.OBJECTS:
-            return ""
-        if size.name not in usual.parameters or size.unit != usual.unit:
+            return ""  # an object has no usual size
+        if (size.name, size.unit) not in {(name, usual.unit) for name in usual.parameters}:
             return ""
         shown = float(f"{abs(size.value):.2g}")  # as it is read
         how = "smaller than usual" if shown < usual.least else "a usual size"
@@ -101,16 +101,10 @@ def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
 
 def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
     first = rows[0]
-    numbers = tuple(
-        Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
-        for r in rows
-        if r["parameter"]
-    )
-    alone = (
-        Number(r["parameter"], r["unit"], r["own_estimate"], r["own_low"], r["own_high"])
-        for r in rows
-        if isfinite(r["own_estimate"])
-    )
+    sizes = itemgetter("parameter", "unit", "estimate", "ci_low", "ci_high")
+    own = itemgetter("parameter", "unit", "own_estimate", "own_low", "own_high")
+    numbers = tuple(Number(*sizes(row)) for row in rows if row["parameter"])
+    alone = (Number(*own(row)) for row in rows if isfinite(row["own_estimate"]))
     texts = first["what"], first["short"], first["against"], first["remark"]
     what, short, against, remark = map(true_minus, texts)
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))

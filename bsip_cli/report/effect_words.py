@@ -71,10 +71,8 @@ def place_label(effect: str, target: str) -> str:
         return ""
     component, by, quantity = target.partition(" by ")
     if by:  # fz by load
-        which = _WORDS["channels"].get(component, "all components")
-        return f"{which}, " + (
-            f"along with {ALONG[quantity]}" if quantity in ALONG else "on average"
-        )
+        how = f"along with {ALONG[quantity]}" if quantity in ALONG else "on average"
+        return f"{_WORDS['channels'].get(component, 'all components')}, {how}"
     plate, _, channels = target.partition(" ")  # 1 fx>fy, 1 fz or 1
     if effect.startswith("plate_") or plate.isdigit():
         words = " into ".join(_WORDS["channels"].get(one, one) for one in channels.split(">"))
@@ -173,7 +171,6 @@ def separating_recording(causes: Sequence[tuple[str, str]], most: int | None = N
 
 
 def _places(effect: str, causes: Sequence[tuple[str, str]]) -> str:
-    """The same effect at several places: they have to move, or be loaded, one at a time."""
     where = listing([place_label(effect, target) for name, target in causes if name == effect])
     if effect in _LOADS:
         return f"look for what is worn or loose there, or keep still but for one at a time: {where}"

@@ -3,7 +3,7 @@ one number; how large they are against yardsticks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,14 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Scale
-from bsip_cli.report.words import (
-    COMPONENTS,
-    TEXTS,
-    count,
-    listing,
-    number,
-    signed,
-)
+from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
@@ -63,16 +56,10 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         column, unit = "rmse", str(known[OM]["unit"])
         if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
             column, unit = "rmse_percent_bw", "% BW"
-        gains.append(
-            Gain(
-                component,
-                unit,
-                {method: float(row[column]) for method, row in known.items()},
-                trial,
-                min(int(row["n"]) for row in known.values()),
-                known[OM]["data"] == "held_out",
-            )
-        )
+        errors = {method: float(row[column]) for method, row in known.items()}
+        frames = min(int(row["n"]) for row in known.values())
+        held_out = known[OM]["data"] == "held_out"
+        gains.append(Gain(component, unit, errors, trial, frames, held_out))
     return tuple(gains)
 
 
@@ -80,18 +67,16 @@ def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
     """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
     no more than it is; trials without numbers are left out."""
     known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
-    of_each = ([gain for gain in known if gain.component == name] for name in COMPONENTS)
-    return tuple(Errors(of[0].component, of[0].unit, _pooled(of)) for of in of_each if of)
-
-
-def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
-    """Root mean square over all frames, of those of intervals of so many frames."""
-    frames = [gain.frames for gain in gains]
-    methods = [m for m in METHODS if all(m in gain.of for gain in gains)]
-    return {
-        method: float(np.sqrt(np.average([g.of[method] ** 2 for g in gains], weights=frames)))
-        for method in methods
-    }
+    pooled = []
+    for name in COMPONENTS:
+        if mine := [gain for gain in known if gain.component == name]:
+            frames = [gain.frames for gain in mine]
+            methods = [m for m in METHODS if all(m in gain.of for gain in mine)]
+            squares = {m: [gain.of[m] ** 2 for gain in mine] for m in methods}
+            means = {m: np.average(each, weights=frames) for m, each in squares.items()}
+            errors = {m: float(np.sqrt(mean)) for m, mean in means.items()}
+            pooled.append(Errors(name, mine[0].unit, errors))
+    return tuple(pooled)
 
 
 def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: float) -> str:
@@ -140,11 +125,8 @@ def use_sentence(
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
     said = f"{use} {', and '.join([*others, most])}{compared}."
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body; other errors made it."
-        for m in rare
-    ]
-    return " ".join([said, *warned])
+    why = "fewer than 1 in 100 people have such a body; other errors made it"
+    return " ".join([said, *(f"Never use {method}: {why}." for method in rare)])
 
 
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
@@ -163,9 +145,8 @@ def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
         "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
-        return (
-            f": {where}its error is {scaled} than RM's, and OM's error {over_scaled} than RM+mass's"
-        )
+        than_om = f"OM's error {over_scaled} than RM+mass's"
+        return f": {where}its error is {scaled} than RM's, and {than_om}"
     said = f"{om} than RM's and RM+mass's"
     if om != over_scaled:
         said = f"{om} than RM's, {over_scaled} than RM+mass's"
@@ -189,7 +170,6 @@ def _change(ratio: float, log_error: float) -> str:
 
 
 # --- three numbers of a recording against those of good laboratories and the literature -----------
-
 
 COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
@@ -240,17 +220,10 @@ class Yardstick:
     def scale(self, value: float) -> Scale:
         """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
         end = ENDS_AT * self.limit
-        return Scale(
-            self.title,
-            f"{number(value)} {self.unit}",
-            self.words(value),
-            min(value / end, 1.0) if np.isfinite(value) else 0.0,
-            self.good / end,
-            self.limit / end,
-            f"{self.good:.2g}",
-            number(self.limit, 0),
-            bool(value > end),
-        )
+        part = min(value / end, 1.0) if np.isfinite(value) else 0.0
+        words = self.title, f"{number(value)} {self.unit}", self.words(value)
+        marks, is_beyond = (f"{self.good:.2g}", number(self.limit, 0)), bool(value > end)
+        return Scale(*words, part, self.good / end, self.limit / end, *marks, is_beyond)
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:
@@ -274,7 +247,14 @@ def _published(variable: str) -> float:
 def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
     """Errors over trials, from rows of one method of each one's table ``fit``: the root mean square
     of those with held-out data, or of all where there are none; NaN where nothing is known."""
-    rows = [_error(fit) for fit in fits]
+    rows = []
+    for fit in fits:
+        of = fit.set_index("component")
+        rms, percent = of["rmse"].to_dict(), of["rmse_percent_bw"].to_dict()
+        cop = float(np.hypot(rms.get("cop_ap", np.nan), rms.get("cop_ml", np.nan)))
+        held_out = bool((of["data"] == "held_out").any())
+        force = float(percent.get("grf_vertical", np.nan))
+        rows.append({COP: cop, FORCE: force, "held_out": held_out})
     known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
     chosen = [row for row in known if row["held_out"]] or known
     found = {}
@@ -282,12 +262,3 @@ def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
         sizes = [row[name] for row in chosen if np.isfinite(row[name])]
         found[name] = float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
     return found
-
-
-def _error(fit: pd.DataFrame) -> Mapping[str, float]:
-    rows = fit.set_index("component")
-    of = rows["rmse"].to_dict()
-    cop = np.hypot(of.get("cop_ap", np.nan), of.get("cop_ml", np.nan))
-    percent = rows["rmse_percent_bw"].to_dict().get("grf_vertical", np.nan)
-    held_out = bool((fit["data"] == "held_out").any())
-    return {COP: float(cop), FORCE: float(percent), "held_out": held_out}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -44,9 +43,6 @@ from bsip_cli.report.words import (
 )
 from bsip_cli.statistics.methods import OM, RM
 
-if TYPE_CHECKING:
-    from bsip_cli.report.figures.person import Pose
-
 _SEXES = {"M": "man", "F": "woman"}
 _MOST_WORDS = 393  # with the title 400
 _FINDINGS = ((2, 4), (2, 2), (2, 1), (1, 2))  # in full, and kinds that are named only
@@ -84,7 +80,6 @@ def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
 
 
 def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator[blocks.Block]:
-    """At most three things; all others are below."""
     said = to_do(record, light, most)
     yield blocks.Heading("What to do next")
     yield blocks.Bullets(tuple(said[:_MOST_TO_DO]))
@@ -141,26 +136,23 @@ def _files(record: ParticipantRecord) -> str:
 
 def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The widest pose of the trials with a measured force; nothing without any pose."""
-    found = [(trial, pose) for trial in record.trials for pose in _poses(record, trial)]
+    from bsip_cli.report.figures.person import poses_of, stick_figure  # heavy
+
+    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    how = anterior, record.body_weight(), _POSES
+    moved = [(one, one.kinematics) for one in record.trials if one.kinematics is not None]
+    found = [
+        (trial, pose)
+        for trial, kinematics in moved
+        for pose in poses_of(record.body, kinematics, trial.reconstruction, *how)
+    ]
     if not found:
         return ()
     loaded = [one for one in found if one[1].is_loaded()] or found
     trial, pose = max(loaded, key=lambda one: one[1].reach_m())
-    from bsip_cli.report.figures.person import stick_figure
-
     shows = f"{trial.label}: left grey, right black, ground force green"
     figure = stick_figure(pose, trial.label)
     return (blocks.Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
-
-
-def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
-    from bsip_cli.report.figures.person import poses_of
-
-    if trial.kinematics is None:
-        return ()
-    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
-    measured = trial.kinematics, trial.reconstruction
-    return poses_of(record.body, *measured, anterior, record.body_weight(), _POSES)
 
 
 # --- is anything wrong --------------------------------------------------------------------------
@@ -212,7 +204,6 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
 
 
 def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
-    """Those of which the page says all."""
     return record.causes[: most - len(large_finding(record))]
 
 

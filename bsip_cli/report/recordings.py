@@ -25,14 +25,7 @@ from bsip_cli.report.errors import (
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import (
-    TEXTS,
-    findings,
-    listing,
-    number,
-    task_of,
-    trial_label,
-)
+from bsip_cli.report.words import TEXTS, findings, listing, number, task_of, trial_label
 from bsip_cli.statistics.methods import OM, RM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
@@ -48,14 +41,8 @@ _once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 
 def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yardstick, float], ...]:
     """The three yardsticks with this person's numbers, by a method, or by the one to use."""
-    fits = [
-        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
-        for trial in record.moving_trials()
-        if trial.fit is not None
-    ]
-    values = errors_of(fits)
-    values[MARKERS] = 1e3 * float(record.facts["marker_rms_m"])
-    return tuple((one, values[one.name]) for one in _yardsticks(record))
+    markers_mm = 1e3 * float(record.facts["marker_rms_m"])
+    return _measured(record, record.moving_trials(), markers_mm, method)
 
 
 @_once
@@ -99,18 +86,22 @@ def names_of(record: ParticipantRecord) -> dict[str, str]:
     }
 
 
-def _yardsticks(record: ParticipantRecord) -> tuple[Yardstick, ...]:
-    """With the limits that the diagnosis was run with."""
+def _measured(
+    record: ParticipantRecord, trials: Sequence[TrialRecord], markers_mm: float, method: str = ""
+) -> tuple[tuple[Yardstick, float], ...]:
+    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials."""
     limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
-    return yardsticks(*limits)
+    fits = [
+        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
+        for trial in trials
+        if trial.fit is not None
+    ]
+    values = errors_of(fits) | {MARKERS: markers_mm}
+    return tuple((one, values[one.name]) for one in yardsticks(*limits))
 
 
 def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick, float], ...]:
-    """The yardsticks with a recording's own numbers, by the method to use."""
-    fit = record.used_fit(trial)
-    values = errors_of([] if fit is None else [fit])
-    values[MARKERS] = trial.markers_mm()
-    return tuple((one, values[one.name]) for one in _yardsticks(record))
+    return _measured(record, [trial], trial.markers_mm())
 
 
 def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
@@ -238,7 +229,6 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
 
 
 def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
-    """``all recordings``, their names, or how many of each task."""
     if len(stems) == len(names):
         return "all recordings"
     items: list[str] = []

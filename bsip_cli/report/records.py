@@ -101,11 +101,8 @@ class ParticipantRecord:
         """What the diagnosis found; nothing where none was made."""
         return () if self.diagnosis is None else causes_of(candidates_of(self.diagnosis))
 
-    def mass_kg(self) -> float:
-        return float(self.facts["mass_kg"])
-
     def body_weight(self) -> float:
-        return self.mass_kg() * GRAVITY_M_S2
+        return float(self.facts["mass_kg"]) * GRAVITY_M_S2
 
     def method(self, method: str) -> pd.DataFrame:
         """Rows of ``bsip`` of one method, in the skeleton's order of segments."""
@@ -137,11 +134,6 @@ class ParticipantRecord:
         others.pop(self.use(), None)
         said = "; ".join(f"{', '.join(some)}: {method}" for method, some in others.items())
         return f"{self.use()} ({said})" if said else self.use()
-
-    def used_fit(self, trial: TrialRecord) -> pd.DataFrame | None:
-        """Of a trial's ``fit`` the rows of the parameters to use in its movement."""
-        fit = trial.fit
-        return None if fit is None else fit[fit["method"] == self.use(trial.task)]
 
     def option(self, section: str, name: str) -> float:
         """An option that a stage was run with, or as shipped."""
@@ -205,14 +197,11 @@ class HowMade:
                 made.options.setdefault(name, set()).add(_as_text(value))
             for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
                 made.versions.setdefault(name, set()).add(version)
-            made.files.update(
-                (name, digest)
-                for name, digest in origin.inputs.items()
-                if "." in name and not name.endswith(".parquet")  # no artifact, no person's all
-            )
-            made.messages.update(
-                dict.fromkeys((origin.stage, origin.unit, text) for text in origin.messages)
-            )
+            for name, digest in origin.inputs.items():
+                if "." in name and not name.endswith(".parquet"):  # no artifact, no person's all
+                    made.files[name] = digest
+            for text in origin.messages:
+                made.messages[origin.stage, origin.unit, text] = None
         return made
 
     def number(self, option: str, otherwise: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from string import ascii_lowercase
 
@@ -67,7 +67,7 @@ NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 class Verdict:
     """All that is said of a diagnosis.
 
-    headline : whether anything is wrong. found : whether anything was.
+    headline : whether anything is wrong.
     causes : a text per cause or group of causes that cannot be distinguished here.
     results : what the causes do to forces and parameters, and where they were looked for.
     advice : what follows for the reader.
@@ -75,7 +75,6 @@ class Verdict:
     """
 
     headline: str
-    found: bool
     causes: tuple[str, ...]
     results: tuple[str, ...]
     advice: tuple[str, ...]
@@ -96,20 +95,17 @@ def verdict_of(
     causes = causes_of(candidates_of(diagnosis))
     everywhere = analysed(detection, diagnosis)
     light = light_of(diagnosis, detection, budget, before=len(before))
-    names = [trial_label(stem) for stem in everywhere]
+    results: list[str] = []
+    if budget is not None:
+        results += budget_words.budget_sentences(budget, effects_in(causes))
+    if any(cause[0].effect != UNNAMED for cause in causes):  # what has a name is put into a model
+        results += _results(gains, changes)
+    if everywhere:
+        results.append(f"Recordings analysed: {listing([*map(trial_label, everywhere)])}.")
     return Verdict(
         f"{light.title}. {light.text}".rstrip(),
-        bool(causes),
         (*before, *(cause_text(cause, everywhere) for cause in causes)),
-        (
-            *(
-                budget_words.budget_sentences(budget, effects_in(causes))
-                if budget is not None
-                else ()
-            ),
-            *(_results(causes, gains, changes) if causes else ()),
-            *([f"Recordings analysed: {listing(names)}."] if names else ()),
-        ),
+        tuple(results),
         (*filter(None, [_named_twice(causes)]), *consequences(causes, 1 + len(before))),
         unseen(detection, diagnosis),
     )
@@ -210,7 +206,6 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
-    """What all say is said once."""
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))
         either = ", ".join(one.words.short for one in cause)
@@ -219,11 +214,10 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
             f"(probability of the last {mass})."
         )
     ranked = sorted(cause, key=lambda one: one.effect == UNNAMED)
-    members = [
-        effect_title(one.effect)
-        + ("" if one.effect == UNNAMED else f" ({one.words.short or one.words.what})")
-        for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]
-    ]
+    members = []
+    for one in ranked[: _MOST_MEMBERS if len(cause) == _MOST_MEMBERS else 1]:
+        size = "" if one.effect == UNNAMED else f" ({one.words.short or one.words.what})"
+        members.append(f"{effect_title(one.effect)}{size}")
     places = Counter(effect_title(one.effect) for one in ranked[len(members) :])
     others = [f"{title} ({n} places)" if n > 1 else title for title, n in places.items()]
     return (
@@ -261,36 +255,29 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
     """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those analysed."""
     names = [trial_label(stem) for stem in trials]
     if len(everywhere) > 1 and set(trials) >= set(everywhere):
-        return (
-            "in both recordings" if len(everywhere) == 2 else f"in all {len(everywhere)} recordings"
-        )
+        every = "both" if len(everywhere) == 2 else f"all {len(everywhere)}"
+        return f"in {every} recordings"
     return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
 
 
 def _how_sure(cause: Sequence[Candidate]) -> str:
-    """How probable it is, and what it explains of data that were not used to size it."""
     words = probability_words(probability_of(cause))
     if words:
         rest = ", else the stated mass is wrong" if cause[0].class_id == OF_THE_WEIGHT else ""
         words = f"probability {words}" if len(cause) == 1 else f"together {words}{rest}"
-    said = [words, *(_explained(one, k, cause) for k, one in enumerate(cause))]
-    text = "; ".join(filter(None, said))
-    return f"{capital(text)}." if text else ""
-
-
-def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str:
-    """Empty where that was not tested."""
-    gain, low, high = one.gain
-    if not np.isfinite(gain):
-        return ""
-    digits = 0 if gain >= 10 else 1
-    share, least, most = (number(x, digits) for x in (gain, low, high))
-    which = f"({ascii_lowercase[position]}) " if len(cause) > 1 else ""
-    perhaps = "" if low > 0 else ": too few seconds to be sure"
-    return (
-        f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared difference in "
-        "seconds it was not fitted to"
-    )
+    said = [words] if words else []
+    for letter, (gain, low, high) in zip(
+        ascii_lowercase, (one.gain for one in cause), strict=False
+    ):
+        if np.isfinite(gain):  # else it was not tested
+            share, least, most = (number(x, 0 if gain >= 10 else 1) for x in (gain, low, high))
+            which = f"({letter}) " if len(cause) > 1 else ""
+            perhaps = "" if low > 0 else ": too few seconds to be sure"
+            said.append(
+                f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared "
+                "difference in seconds it was not fitted to"
+            )
+    return f"{capital('; '.join(said))}." if said else ""
 
 
 def probability_of(cause: Sequence[Candidate]) -> float:
@@ -310,15 +297,12 @@ def probability_words(probability: float) -> str:
 # --- what it does -----------------------------------------------------------------------------
 
 
-def _results(
-    causes: Sequence[Sequence[Candidate]], gains: pd.DataFrame | None, changes: pd.DataFrame | None
-) -> tuple[str, ...]:
-    if all(cause[0].effect == UNNAMED for cause in causes):
-        return ()  # what has no name cannot be put into a model
+def _results(gains: pd.DataFrame | None, changes: pd.DataFrame | None) -> Iterator[str]:
     if gains is None:
-        return ("What it does to the result is not known: run `bsip extend`.",)
+        yield "What it does to the result is not known: run `bsip extend`."
+        return
     said = [gain_sentence(gains), change_sentence(changes) if changes is not None else ""]
-    return tuple(filter(None, said))
+    yield from filter(None, said)
 
 
 def gain_sentence(gains: pd.DataFrame) -> str:
@@ -406,12 +390,10 @@ def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if len(cause) == 1 and cause[0].effect == UNNAMED:
         check = check_for(cause[0].target, [size.name for size in cause[0].numbers])
         known = [replace(known[0], action=check or known[0].action)]
-    lab = (
-        ((TEXTS["of_the_laboratory"], ""),)
-        if all(one.scope == "laboratory" for one in cause)
-        else ()
-    )
-    return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
+    said = [*dict.fromkeys((words.meaning, words.action) for words in known)]
+    if all(one.scope == "laboratory" for one in cause):
+        said.append((TEXTS["of_the_laboratory"], ""))
+    return tuple(said)
 
 
 def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:

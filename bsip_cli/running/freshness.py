@@ -36,7 +36,20 @@ def why_stale(unit: Unit) -> str:
 
 def was_changed(unit: Unit) -> list[str]:
     """Files that the unit has written and that are no more what it wrote, as clauses."""
-    return [name for kind in unit.stage.writes for name in _changed(unit, kind)]
+    found = []
+    for kind in unit.stage.writes:
+        path = unit.path(kind)
+        if not path.is_file():  # a folder in its place is reported when it is to be written
+            continue
+        try:
+            read_header(path, kind)
+        except BadDataError as error:
+            if not fingerprint(path).intact:  # else it is of another version of bsip
+                found.append(f"{path.name} {error.found}")
+            continue
+        names = (name for name in _changed_files(unit, kind) if (unit.out / name).exists())
+        found += [f"{name} has changed since bsip wrote it" for name in names]
+    return found
 
 
 def stale_upstream(unit: Unit, participant: Participant | None, stages: Collection[Stage]) -> str:
@@ -77,7 +90,6 @@ def units_of(
 
 @lru_cache(maxsize=64)
 def _before(stage: Stage) -> tuple[Stage, ...]:
-    """The stages whose results a stage reads, directly or not, in order."""
     found: set[str] = set()
     waiting = list(stage.inputs)
     while waiting:
@@ -126,7 +138,6 @@ def _differs(known: Mapping | None, wanted: Mapping) -> str:
 
 
 def _names(one: Mapping, other: Mapping) -> list[str]:
-    """Keys under which two mappings differ."""
     return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
 
 
@@ -139,19 +150,6 @@ def _changed_files(unit: Unit, kind: str) -> list[str]:
         for name, known in zip(listed["file"], listed["sha256"], strict=True)
         if not (path := unit.out / name).is_file() or file_hash(path) != known
     ]
-
-
-def _changed(unit: Unit, kind: str) -> list[str]:
-    path = unit.path(kind)
-    if not path.is_file():  # a folder in its place is reported when it is to be written
-        return []
-    try:
-        read_header(path, kind)
-    except BadDataError as error:
-        is_sealed = fingerprint(path).intact  # then it is of another version of bsip
-        return [] if is_sealed else [f"{path.name} {error.found}"]
-    files = [name for name in _changed_files(unit, kind) if (unit.out / name).exists()]
-    return [f"{name} has changed since bsip wrote it" for name in files]
 
 
 def outdated(path: Path) -> str:

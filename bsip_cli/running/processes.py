@@ -106,7 +106,6 @@ def endings_wait() -> Iterator[None]:
 
 # --- workers ----------------------------------------------------------------------------------
 
-
 _SPAWN = multiprocessing.get_context("spawn")
 _TO_END_S = 2.0  # for a worker that was asked to end; then it is killed
 
@@ -214,10 +213,8 @@ def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
 
 
 def _serve(pipe: Connection) -> None:
-    """Take tasks until the pipe is closed, or a signal comes.
-
-    Their imports, which take seconds, come with the first task: by then signals are answered.
-    """
+    """Take tasks until the pipe is closed, or a signal comes. Their imports, which take seconds,
+    come with the first task: by then signals are answered."""
     try:
         raise_when_ended(once=True)
         threading.Thread(target=_leave_with_parent, daemon=True).start()

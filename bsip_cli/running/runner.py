@@ -104,8 +104,7 @@ def run_stages(
             yield from (outcome for _, outcome in _outcomes([group], 1))
             continue
         part: _Part = ("last" if personal[-1] in mine else "first") if whole else "some"
-        alone = (
-            # all that a process needs to know
+        alone = (  # all that a process needs to know
             _Task(mine, Study(study.root, (one,)), out, config, manner, one, part=part)
             for one in study.participants
         )
@@ -115,7 +114,6 @@ def run_stages(
 
 
 def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]]:
-    """Whose, and what; the end of a process stops nobody else's work."""
     for result in work_on(tasks, _run, jobs, _tidy):
         if isinstance(result, Died):
             task, code = result.task, result.exit_code or 0
@@ -135,7 +133,6 @@ def _tidy(task: _Task) -> None:
 
 
 def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
-    """The stages of a task, unless another bsip is at them."""
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):
@@ -194,11 +191,9 @@ def _state(task: _Task) -> str:
 
 
 def _run_alone(task: _Task) -> Iterator[Outcome]:
-    """Unit by unit; what cannot be written ends it, else the rest would be made without it.
-
-    Who is not up to date is left out of the group; and a word is said where stages that are run
-    alone build on what is not.
-    """
+    """Unit by unit; what cannot be written ends it, else the rest would be made without it. Who is
+    not up to date is left out of the group; and a word is said where stages that are run alone
+    build on what is not."""
     study, left_out = task.study, dict[str, str]()
     if task.participant is not None:
         _forget_gone_recordings(task.folder, task.participant)
@@ -208,7 +203,11 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
         found = {one.id: stale_upstream(like, one, task.stages) for one in doubtful}
         left_out = {name: why for name, why in found.items() if why}
         study = Study(study.root, tuple(one for one in people if one.id not in left_out))
-        yield from _left_out(task, left_out)
+        for why in dict.fromkeys(left_out.values()):
+            whose = listed(name for name, its_own in left_out.items() if its_own == why)
+            said = (f"{whose}: left out of the group, since {why}; run `bsip run` first",)
+            stage, code = task.stages[0].name, errors.BadDataError.exit_code
+            yield Outcome(stage, "group", "refused", said, code)
     units = list(task.units(study, left_out))
     if why := stale_upstream(units[0], task.participant, task.stages):
         said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
@@ -218,14 +217,6 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
         yield outcome
         if outcome.state == "unwritten":
             return
-
-
-def _left_out(task: _Task, left_out: Mapping[str, str]) -> Iterator[Outcome]:
-    stage, code = task.stages[0].name, errors.BadDataError.exit_code
-    for why in dict.fromkeys(left_out.values()):
-        names = [name for name, its_own in left_out.items() if its_own == why]
-        said = f"{listed(names)}: left out of the group, since {why}; run `bsip run` first"
-        yield Outcome(stage, "group", "refused", (said,), code)
 
 
 def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
@@ -281,18 +272,17 @@ def lacking(unit: Unit, refused_code: int = 0) -> Outcome | None:
     """Why a unit cannot begin: what it reads is not there, or was refused, which ends in that exit
     code."""
     stage, gone = unit.stage.name, unit.missing()
-    if not unit.participants():
-        why = f"{unit.name}: nobody is left for {stage}"
-        return Outcome(stage, unit.name, "waiting", (why,), refused_code)
-    if not gone:
+    people, code = unit.participants(), refused_code
+    if people and not gone:
         return None
-    folders = [unit.out / participant.id for participant in unit.participants()]
-    if any(any(folder.glob("*_refusal-*.parquet")) for folder in folders):
-        why = f"{unit.name}: left out of {stage}, since its input was refused"
-        return Outcome(stage, unit.name, "waiting", (why,), refused_code)
-    first = producer(gone[0]).name
-    why = f"{unit.name}: {stage} has no {', '.join(gone)} to read"
-    return Outcome(stage, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
+    if not people:
+        why = f"nobody is left for {stage}"
+    elif any(any((unit.out / one.id).glob("*_refusal-*.parquet")) for one in people):
+        why = f"left out of {stage}, since its input was refused"
+    else:
+        first, code = producer(gone[0]).name, 2
+        why = f"{stage} has no {', '.join(gone)} to read; run `bsip {first}` first"
+    return Outcome(stage, unit.name, "waiting", (f"{unit.name}: {why}",), code)
 
 
 def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
@@ -328,19 +318,15 @@ def held_alone(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise errors.not_writable(folder, error) from None
     with handle:
-        _lock(handle.fileno(), folder)
+        try:
+            fcntl.flock(handle.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise errors.UsageError(
+                "another bsip is writing there",
+                file=folder,
+                remedy="wait until it has ended, and run again",
+            ) from None
+        except OSError as error:
+            raise errors.not_writable(folder, error) from None
         remove_unfinished(folder)
         yield
-
-
-def _lock(descriptor: int, folder: Path) -> None:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise errors.UsageError(
-            "another bsip is writing there",
-            file=folder,
-            remedy="wait until it has ended, and run again",
-        ) from None
-    except OSError as error:
-        raise errors.not_writable(folder, error) from None

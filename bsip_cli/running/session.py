@@ -128,7 +128,6 @@ def open_study(
 
 
 def _left_behind(out: Path, study: Study) -> str:
-    """Whose results lie there who are no more in the study."""
     known = {participant.id for participant in study.participants}
     gone = [path.name for path in sorted(out.glob("sub-*/*_skeleton.parquet"))]
     names = sorted({name.split("_")[0] for name in gone} - known)
@@ -205,16 +204,13 @@ class _Voice:
         for (stage, sentence), units in self.said.items():
             if len(units) > 1:
                 others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
-                _write(stage, others)
+                tqdm.write(f"{stage}: {others}", file=sys.stderr)
 
 
 def _say(outcome: Outcome, sentence: str) -> None:
     lines = sentence.split("\n") if outcome.state == "bug" else [sentence]  # with its trace
-    _write(outcome.stage, "\n".join(map(printable, lines)))
-
-
-def _write(stage: str, text: str) -> None:
-    tqdm.write(f"{stage}: {text}", file=sys.stderr)
+    text = "\n".join(map(printable, lines))
+    tqdm.write(f"{outcome.stage}: {text}", file=sys.stderr)
 
 
 def _config(root: Path, config_file: Path | None, estimators: tuple[str, ...]) -> Config:
@@ -248,7 +244,6 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> Non
 
 
 def _check_trials(loads: Sequence[Load], study: Study) -> None:
-    """Every load is carried in some trial, and names nothing that the study does not have."""
     trials = [trial for participant in study.participants for trial in participant.trials]
     participants = sorted({trial.participant_id for trial in trials})
     tasks = sorted({trial.task for trial in trials})

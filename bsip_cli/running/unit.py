@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from importlib.metadata import version
-from itertools import takewhile
+from itertools import compress, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +51,7 @@ class Unit:
 
     @property
     def name(self) -> str:
-        if self.trial is not None:
-            return self.trial.stem
-        return _owner(self.participant)
+        return self.trial.stem if self.trial else _owner(self.participant)
 
     @property
     def person(self) -> Participant:
@@ -91,9 +89,8 @@ class Unit:
 
     def refusal_path(self) -> Path:
         """Where a refusal of this unit is written down."""
-        return (
-            self.out / _owner(self.participant) / f"{self.name}_refusal-{self.stage.name}.parquet"
-        )
+        name = f"{self.name}_refusal-{self.stage.name}.parquet"
+        return self.out / _owner(self.participant) / name
 
     def loads(self, trial: Trial | None = None) -> tuple[Load, ...]:
         """Known loads of a trial (by default the unit's own; without one, of the participant)."""
@@ -113,12 +110,9 @@ class Unit:
 
     def trials(self, *kinds: str) -> tuple[Trial, ...]:
         """The participant's trials for which all these kinds are there and not refused."""
-        names = self._names(self.person)
-        return tuple(
-            trial
-            for trial in self.person.trials
-            if all(self.stands(kind, trial, self.person, names) for kind in kinds)
-        )
+        whose, names = self.person, self._names(self.person)
+        there = (all(self.stands(k, one, whose, names) for k in kinds) for one in whose.trials)
+        return tuple(compress(whose.trials, there))
 
     def stands(
         self,
@@ -223,8 +217,8 @@ class Unit:
         if "loads" in options:  # another person's or trial's load changes nothing here
             options["loads"] = [load.model_dump(mode="json") for load in self.loads()]
         if (one := self.participant) is not None:
-            known = {"sex": one.sex, "mass_kg": one.mass_kg, "height_m": one.height_m}
-            options["participant"] = known
+            names = ("sex", "mass_kg", "height_m")
+            options["participant"] = {name: getattr(one, name) for name in names}
         return {
             "stage": self.stage.name,
             "bsip_version": __version__,
@@ -275,9 +269,8 @@ class Unit:
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> dict:
         """What the producing stage said of its result as a whole."""
-        return artifacts.read_header(self.path(kind, trial, participant), kind)["provenance"][
-            "facts"
-        ]
+        header = artifacts.read_header(self.path(kind, trial, participant), kind)
+        return header["provenance"]["facts"]
 
     def said_before(self, kind: str) -> dict:
         """Facts of what the unit has written last; empty where that cannot be read."""
@@ -293,9 +286,8 @@ class Unit:
         self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
     ) -> None:
         """Write what does not fit into memory; the facts are known after the last part."""
-        artifacts.write_artifact_in_parts(
-            self.path(kind), kind, parts, lambda: self._notes(facts())
-        )
+        path = self.path(kind)
+        artifacts.write_artifact_in_parts(path, kind, parts, lambda: self._notes(facts()))
 
     def _notes(self, facts: dict) -> dict:
         return {"made_by": self.made_by, "messages": list(self.messages), "facts": facts}
@@ -370,7 +362,6 @@ def imported_by(module: str) -> frozenset[str]:
 
 @lru_cache(maxsize=1024)
 def _named_in(module: str) -> frozenset[str]:
-    """Modules, and what else may be one, that a module's text names in imports."""
     text = _source(module) or ""
     named = set(_IMPORT.findall(text))
     for package, names in _FROM.findall(text):
@@ -388,7 +379,6 @@ def _place_of(module: str) -> Path:
 
 @lru_cache(maxsize=1024)
 def _source(module: str) -> str | None:
-    """Its text; None where there is no such module."""
     place = _place_of(module)
     files = (file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file())
     return next((file.read_text(encoding="utf-8") for file in files), None)
@@ -399,10 +389,10 @@ def _data_of(modules: frozenset[str]) -> set[Path]:
     named = {name for module in modules for name in _SHIPPED.findall(_source(module) or "")}
     folders = {_place_of(module.rpartition(".")[0]) for module in modules if "." in module}
     folders -= {_PACKAGE}
-    inside = {file for folder in folders for file in _below(folder)}
-    own = {
-        f for f in inside if next(p for p in f.parents if (p / "__init__.py").is_file()) in folders
-    }
+    own = set()
+    for file in (file for folder in folders for file in _below(folder)):
+        if next(p for p in file.parents if (p / "__init__.py").is_file()) in folders:
+            own.add(file)
     return own.union(*(_below(shipped(name)) for name in named - {_OPTIONS}))
 
 

@@ -14,22 +14,13 @@ from bsip_cli.diagnosis.support import Support
 from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.words import count, listing, number
 from bsip_cli.running.unit import Unit
-from bsip_cli.statistics.choice import (
-    COMPONENTS,
-    PAIRS,
-    Difference,
-    Differences,
-    Pair,
-    between,
-    chosen,
-    within,
-)
+from bsip_cli.statistics import choice
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
 _SIGNALS = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "cop_ap_m", "cop_ml_m"]
-_COLUMNS = {PAIRS[0]: "om", PAIRS[2]: "rm_mass", PAIRS[1]: "om_rm_mass"}
-_UNKNOWN = dict.fromkeys(PAIRS, Difference(np.nan, np.nan))
+_COLUMNS = {choice.PAIRS[0]: "om", choice.PAIRS[2]: "rm_mass", choice.PAIRS[1]: "om_rm_mass"}
+_UNKNOWN = dict.fromkeys(choice.PAIRS, choice.Difference(np.nan, np.nan))
 _ALL = "all"  # movements
 _FORCE = ["fx", "fy", "fz"]
 _WHERE = {
@@ -37,7 +28,7 @@ _WHERE = {
     "held_out": "in seconds held out of the trials that identified OM, which share their constant "
     "errors (no other trial is there)",
 }
-_DECIDING = {OM: PAIRS[:2], RM_MASS: (PAIRS[2], PAIRS[1]), RM: PAIRS}
+_DECIDING = {OM: choice.PAIRS[:2], RM_MASS: (choice.PAIRS[2], choice.PAIRS[1]), RM: choice.PAIRS}
 
 
 @dataclass(frozen=True)
@@ -48,7 +39,7 @@ class Judge:
     trial: Trial
     log_error: dict[str, float]
     force_N: dict[str, float]
-    alone: Callable[[Pair], Difference]
+    alone: Callable[[choice.Pair], choice.Difference]
 
 
 def run(unit: Unit) -> None:
@@ -66,10 +57,10 @@ def run(unit: Unit) -> None:
     # every movement counts once; of a single one, as far as its own trials show
     over_all = next(iter(of_each.values()), _UNKNOWN)
     if len(of_each) > 1:
-        logs = {pair: [one[pair].log for one in of_each.values()] for pair in PAIRS}
-        over_all = {pair: between(each) for pair, each in logs.items()}
+        logs = {pair: [one[pair].log for one in of_each.values()] for pair in choice.PAIRS}
+        over_all = {pair: choice.between(each) for pair, each in logs.items()}
     found = {_ALL: over_all, **of_each}
-    use = {movement: chosen(differences, is_rare) for movement, differences in found.items()}
+    use = {movement: choice.chosen(differences, is_rare) for movement, differences in found.items()}
     rows = []
     for movement, differences in found.items():
         judging, best = by_movement.get(movement, judges), use[movement]
@@ -80,7 +71,7 @@ def run(unit: Unit) -> None:
 
 
 def _row(
-    movement: str, use: str, differences: Differences, trials: int, data: str, said: str
+    movement: str, use: str, differences: choice.Differences, trials: int, data: str, said: str
 ) -> dict:
     ratios = {f"ratio_{name}": differences[pair].ratio for pair, name in _COLUMNS.items()}
     errors = {f"log_error_{name}": differences[pair].error for pair, name in _COLUMNS.items()}
@@ -102,8 +93,9 @@ def _use(movement: str, use: dict[str, str]) -> str:
     return f"Use {use[_ALL]}" + (f" ({'; '.join(others)})" if others else "")
 
 
-def _why(use: str, differences: Differences, judges: list[Judge], data: str, is_rare: bool) -> str:
-    """Ground forces in newtons, then what decided."""
+def _why(
+    use: str, differences: choice.Differences, judges: list[Judge], data: str, is_rare: bool
+) -> str:
     if not judges:
         return "no trial is left to judge by, so the table's parameters stand."
     where = _WHERE[data].format(trials=count(len(judges), "trial"))
@@ -124,7 +116,7 @@ def _why(use: str, differences: Differences, judges: list[Judge], data: str, is_
     )
 
 
-def _compared(other: str, one: Difference) -> str:
+def _compared(other: str, one: choice.Difference) -> str:
     """``30 to 41 % less than RM``: one standard error to either side."""
     ends = [100 * (ratio - 1) for ratio in one.interval()]
     if not np.isfinite(ends).all():
@@ -142,39 +134,33 @@ def _compared(other: str, one: Difference) -> str:
 
 
 def _judges(unit: Unit) -> tuple[list[Judge], str]:
-    """Moving trials that OM never saw; without any, the seconds of its own that were held out.
-
-    Forces that an external contact bears judge nobody.
-    """
+    """Moving trials that OM never saw; without any, the seconds of its own that were held out. What
+    an external contact bears judges nobody."""
     own = set(unit.read("used-blocks")["trial"])
     contacts = unit.facts("identification")["external_contacts"]
     moving = [t for t in unit.trials("fit", "reconstruction") if t.role != "static"]
+    known = []
     for trial in moving:
         if trial.stem in contacts:
             found = Support(**contacts[trial.stem]).words()
             unit.say(f"{trial.stem} does not judge: {found}")
-    judges = [_judge(unit, trial) for trial in moving if trial.stem not in contacts]
-    known = [judge for judge in judges if judge is not None]
+            continue
+        fit = unit.read("fit", trial)
+        held_out = fit[(fit["data"] == "held_out") & fit["method"].isin(METHODS)]
+        errors = held_out.pivot(index="component", columns="method", values="rmse")
+        errors = errors.reindex(index=choice.COMPONENTS, columns=METHODS).dropna()
+        if not errors.empty:  # some held-out frame compares all methods
+            force_N = np.sqrt((errors.reindex(_FORCE) ** 2).sum()).to_dict()
+            components = [choice.COMPONENTS.index(name) for name in errors.index]
+            alone = partial(_within, unit, trial, components)
+            known.append(Judge(trial, np.log(errors).mean().to_dict(), force_N, alone))
     unseen = [judge for judge in known if judge.trial.stem not in own]
     return (unseen, "whole_trials") if unseen else (known, "held_out" if known else "none")
 
 
-def _judge(unit: Unit, trial: Trial) -> Judge | None:
-    """None where no held-out frame of a trial compares all methods."""
-    fit = unit.read("fit", trial)
-    held_out = fit[(fit["data"] == "held_out") & fit["method"].isin(METHODS)]
-    errors = held_out.pivot(index="component", columns="method", values="rmse")
-    errors = errors.reindex(index=COMPONENTS, columns=METHODS).dropna()
-    if errors.empty:
-        return None
-    logs = np.log(errors).mean()
-    force_N = np.sqrt((errors.reindex(_FORCE) ** 2).sum())
-    components = [COMPONENTS.index(name) for name in errors.index]
-    alone = partial(_within, unit, trial, components)
-    return Judge(trial, logs.to_dict(), force_N.to_dict(), alone)
-
-
-def _within(unit: Unit, trial: Trial, components: list[int], pair: Pair) -> Difference:
+def _within(
+    unit: Unit, trial: Trial, components: list[int], pair: choice.Pair
+) -> choice.Difference:
     rows = unit.read("reconstruction", trial)
     measured = rows[rows["method"] == MEASURED]
     judged = measured["valid"].to_numpy() & ~measured["used"].to_numpy()
@@ -182,17 +168,16 @@ def _within(unit: Unit, trial: Trial, components: list[int], pair: Pair) -> Diff
     residuals = np.array(signals)[..., components] - measured[_SIGNALS].to_numpy()[:, components]
     residuals[:, ~np.isfinite(residuals).all(axis=0)] = np.nan  # over the same frames, as in fit
     first, second = (residuals[METHODS.index(name)] for name in pair)
-    return within(first, second, valid_intervals(judged))
+    return choice.within(first, second, valid_intervals(judged))
 
 
 # --- differences ------------------------------------------------------------------------------
 
 
-def _differences(judges: list[Judge]) -> Differences:
-    """In one movement."""
+def _differences(judges: list[Judge]) -> choice.Differences:
     if len(judges) == 1:
-        return {pair: judges[0].alone(pair) for pair in PAIRS}
+        return {pair: judges[0].alone(pair) for pair in choice.PAIRS}
     return {
-        (a, b): between([judge.log_error[a] - judge.log_error[b] for judge in judges])
-        for a, b in PAIRS
+        (a, b): choice.between([judge.log_error[a] - judge.log_error[b] for judge in judges])
+        for a, b in choice.PAIRS
     }

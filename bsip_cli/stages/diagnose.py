@@ -20,6 +20,7 @@ from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
 from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
+from bsip_cli.diagnosis.shared_faults import with_known
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
 from bsip_cli.report.budget_words import term_words
@@ -80,11 +81,9 @@ def run(unit: Unit) -> None:
     findings = (*(replace(one, trials=trials) for one, trials in left if trials), *findings)
     if not trials:
         unit.say("no trial has motion with every contact on a plate; no movement can be diagnosed")
-    names = dict.fromkeys(
-        [*(x.trial.stem for x in trials), *(t for f in findings for t in f.trials)]
-    )
-    facts["trials"] = list(names)
-    diagnosis = rows_of(findings, tuple(names))
+    stems = [one.trial.stem for one in trials]
+    facts["trials"] = [*dict.fromkeys([*stems, *(t for f in findings for t in f.trials)])]
+    diagnosis = rows_of(findings, tuple(facts["trials"]))
     unit.write("overall-error-budget", budget)
     unit.write("overall-diagnosis", diagnosis, facts)
     unit.write("detection", limits)
@@ -98,10 +97,10 @@ def _searched(
     unit: Unit, trials: Sequence[Diagnosed], known: Known | None
 ) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, given what the markers prove and other persons show."""
-    options = unit.config.diagnosis
-    given = [
-        x.for_faults if known is None else known.given_to(x.for_faults, not x.moves) for x in trials
-    ]
+    options, given = unit.config.diagnosis, [one.for_faults for one in trials]
+    if known is not None:
+        of_all = known.coordinates, known.mean, known.root
+        given = [with_known(one.for_faults, not one.moves, *of_all) for one in trials]
     session = session_of(given)
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
@@ -131,7 +130,6 @@ def _of_markers(
 
 
 # --- the error budget -----------------------------------------------------------------------------
-
 
 _KIND = "overall-error-budget"
 _MORE_THAN_USUAL = 2.0  # times the usual size: what is usual is no cause of a large error
@@ -170,12 +168,8 @@ def error_budget(
 def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
     """What most of an error goes along with that is more than usual: the budget sizes everything
     freely, which is no proof."""
-    rows = budget[
-        budget["trial"].isin(trials)
-        & (budget["component"] == component)
-        & (budget["target"] == "")
-        & (budget["scale"] > _MORE_THAN_USUAL)
-    ]
+    mine = budget[budget["trial"].isin(trials) & (budget["component"] == component)]
+    rows = mine[(mine["target"] == "") & (mine["scale"] > _MORE_THAN_USUAL)]
     shares = rows.groupby("term", sort=False)["share_percent"].mean()
     if shares.empty or not shares.max() > _MOST_PERCENT:
         return "nothing that bsip knows goes along with it"

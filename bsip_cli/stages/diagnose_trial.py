@@ -37,7 +37,6 @@ def run(unit: Unit) -> None:
 
 # --- what the artifacts of a person's diagnosis hold: rows of findings and limits, facts ----------
 
-
 _STEP = 1e-3  # of the typical size
 
 
@@ -83,16 +82,11 @@ def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict
             more = held.values(one.number).tolist(), _bounds(found, one)
             causes.append(cause_record(*key, fault.values, *more, said[key]))
     starts = first_blocks(session)
-    return {
-        "trials": [one.name for one in session.trials],
-        "causes": causes,
-        "block_s": BLOCK_S,
-        "folds": FOLDS,
-        "blocks": {
-            one.name: {"first": starts[t], "start_s": start_s(session, t)}
-            for t, one in enumerate(session.trials)
-        },
-    }
+    names = [one.name for one in session.trials]
+    begin = ({"first": first, "start_s": start_s(session, t)} for t, first in enumerate(starts))
+    blocks = dict(zip(names, begin, strict=True))
+    known = {"trials": names, "causes": causes, "blocks": blocks}
+    return known | {"block_s": BLOCK_S, "folds": FOLDS}
 
 
 def cause_record(

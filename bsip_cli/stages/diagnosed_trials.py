@@ -163,13 +163,11 @@ def diagnosed(
     ]
     if contact is not None:
         terms += _of_hands(fewer, filter_)
-    ground = ground_of(
-        measured,
-        residual,
-        facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
-        0.01 * unit.config.reconstruct.cop_min_force_percent_bw * scene.mass_kg * GRAVITY_M_S2,
-        np.floor(fewer.times_s[filter_.frames]).astype(int),
-    )
+    anterior = facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    percent = unit.config.reconstruct.cop_min_force_percent_bw
+    least_N = 0.01 * percent * scene.mass_kg * GRAVITY_M_S2
+    seconds = np.floor(fewer.times_s[filter_.frames]).astype(int)
+    ground = ground_of(measured, residual, anterior, least_N, seconds)
     marker_noise_m = unit.facts("kinematics", trial)["marker_noise_m"]
     noise = noise_of_instruments(
         fewer, filter_.reference_m, marker_noise_m, scene.rate_hz, options.cutoff_hz
@@ -208,11 +206,9 @@ def _slips(unit: Unit, trial: Trial) -> list[Slip]:
     """Markers off their places that the inverse kinematics has found, a slip's before those of
     the whole trial."""
     rows: list[Any] = list(unit.read("marker-events", trial).itertuples())
-    return [
-        *(Slip(x.marker, x.start_s, x.statistic, 0.0) for x in rows if x.kind == "slip"),
-        *(
-            Slip(x.marker, x.start_s - BEFORE_S, x.statistic, _FAR_OFF * x.size_m / x.statistic)
-            for x in rows
-            if x.kind == "offset" and x.statistic > _FAR_OFF
-        ),
-    ]
+    slips = [Slip(x.marker, x.start_s, x.statistic, 0.0) for x in rows if x.kind == "slip"]
+    for x in rows:
+        if x.kind == "offset" and x.statistic > _FAR_OFF:
+            size_m = _FAR_OFF * x.size_m / x.statistic
+            slips.append(Slip(x.marker, x.start_s - BEFORE_S, x.statistic, size_m))
+    return slips

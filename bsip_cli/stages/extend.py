@@ -31,25 +31,8 @@ from bsip_cli.report.verdict import change_sentence, gain_sentence
 from bsip_cli.report.words import segment_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
+from bsip_cli.stages import identification_problem, reconstruct
 from bsip_cli.stages.frames import WRENCH, bsip_table, load_phi, person_of
-from bsip_cli.stages.identification_problem import (
-    estimate_by,
-    prior_from,
-    problem_of,
-    recordings_of,
-)
-from bsip_cli.stages.reconstruct import (
-    Judgement,
-    Signals,
-    Wrenches,
-    fit_rows,
-    gain_rows,
-    judgement_of,
-    over_the_same_frames,
-    parameters_of,
-    reconstruction_rows,
-    scale_of,
-)
 from bsip_cli.stages.trial_scene import blocks_of, body_as_sized, causes_of, scene_of
 from bsip_cli.statistics.choice import BlockErrors, block_errors, pooled
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
@@ -87,8 +70,7 @@ def run_person(unit: Unit) -> None:
 def _extended(
     unit: Unit, person: Person, bsip: pd.DataFrame, causes: tuple[Cause, ...], trials: list[Trial]
 ) -> pd.DataFrame:
-    """Rows of ``bsip`` per number of causes in the model."""
-    methods, parameters = parameters_of(bsip, person)
+    methods, parameters = reconstruct.parameters_of(bsip, person)
     phi = body_as_sized(unit, parameters[:, methods.index(RM)])
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
@@ -110,12 +92,12 @@ def _identified(
     unit: Unit, person: Person, trials: list[Trial], changes: dict[str, np.ndarray]
 ) -> pd.DataFrame:
     """OM's estimate after ``changes`` are taken off the measured wrench."""
-    prior = prior_from(unit, unit.read("regression"), person)
-    recordings, _ = recordings_of(unit, person, trials, changes)
-    problem, _ = problem_of(unit, person, prior, recordings)
+    prior = identification_problem.prior_from(unit, unit.read("regression"), person)
+    recordings, _ = identification_problem.recordings_of(unit, person, trials, changes)
+    problem, _ = identification_problem.problem_of(unit, person, prior, recordings)
     # the estimator that identified OM, whatever is configured now
     estimator = str(unit.read("identification").set_index("method")["estimator"][OM])
-    found = readable(estimate_by(estimator, problem), prior)
+    found = readable(identification_problem.estimate_by(estimator, problem), prior)
     return bsip_table(OM, person.skeleton.body_names, found.values, found.sd, found.share)
 
 
@@ -182,28 +164,37 @@ def run_trial(unit: Unit) -> None:
         return
     person = person_of(unit)
     measured = unit.read("wrench")
-    judgement = judgement_of(unit, unit.read("kinematics"), measured)
+    judgement = reconstruct.judgement_of(unit, unit.read("kinematics"), measured)
     blocks = blocks_of(unit, unit.own_trial.stem)
     # the body for which the causes were sized, and those of OM and of each extended model
-    methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
+    methods, phi = reconstruct.parameters_of(pd.concat([unit.read("bsip"), extended]), person)
     scene = scene_of(unit, person, body_as_sized(unit, phi[:, methods.index(RM)]))
     carried = phi + load_phi(unit, person)[:, None]
     parameters = dict(zip(methods, carried.T, strict=True))
     fold = blocks.fold_of(judgement.times_s)
-    raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(parameters[OM])}
+    raw: reconstruct.Wrenches = {
+        MEASURED: measured[WRENCH].to_numpy(),
+        OM: scene.wrench_of(parameters[OM]),
+    }
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
         predicted = scene.wrench_of(parameters[method_of(causes[: k + 1])])
         raw[method_of(among)] = predicted + unseen_change_by(among, scene, fold)
     wrenches, signals = judgement.compared(raw)
     ours = [name for name in signals if is_extended(name)]
-    rows = reconstruction_rows(judgement, {name: wrenches[name] for name in ours}, signals)
+    rows = reconstruct.reconstruction_rows(
+        judgement, {name: wrenches[name] for name in ours}, signals
+    )
     unit.amend("reconstruction", rows)
-    alike = over_the_same_frames(signals)
-    unit.amend("fit", fit_rows(judgement, {name: alike[name] for name in (MEASURED, *ours)}))
+    alike = reconstruct.over_the_same_frames(signals)
+    unit.amend(
+        "fit", reconstruct.fit_rows(judgement, {name: alike[name] for name in (MEASURED, *ours)})
+    )
     last = list(signals)[-1]
     errors = _errors(judgement, signals, last, blocks)
-    rows = gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode()))
+    rows = reconstruct.gain_rows(
+        errors, last, _held_out(unit, judgement), crc32(unit.name.encode())
+    )
     sums = {  # per block, for the gain over all trials
         component: {name: values.tolist() for name, values in asdict(one).items()}
         for component, one in errors.items()
@@ -213,25 +204,22 @@ def run_trial(unit: Unit) -> None:
 
 
 def _errors(
-    judgement: Judgement, signals: Signals, method: str, blocks: Blocks
+    judgement: reconstruct.Judgement, signals: reconstruct.Signals, method: str, blocks: Blocks
 ) -> dict[str, BlockErrors]:
-    """Per component, in the units that people read."""
     judged, errors = judgement.judged, {}
     numbers = blocks.of(judgement.times_s)[judged]
     for component in signals[MEASURED]:
-        scale, _ = scale_of(component)
+        scale, _ = reconstruct.scale_of(component)
         compared = (scale * signals[name][component][judged] for name in (MEASURED, OM, method))
         measured, before, after = compared
         errors[component] = block_errors(measured, before, after, numbers)
     return errors
 
 
-def _held_out(unit: Unit, judgement: Judgement) -> str:
+def _held_out(unit: Unit, judgement: reconstruct.Judgement) -> str:
     facts = unit.facts("overall-diagnosis")
-    sizes = (
-        f"blocks of {facts['block_s']:g} s, in {facts['folds']} folds, each judged with the sizes "
-        "of the causes that the other folds gave"
-    )
+    sizes = f"blocks of {facts['block_s']:g} s, in {facts['folds']} folds, each judged with the "
+    sizes += "sizes of the causes that the other folds gave"
     by = "the trial was held out of the identification"
     if judgement.data != "held_out":
         by = "the trial was used in the identification"
@@ -274,6 +262,6 @@ def run_gain(unit: Unit) -> None:
         f"{kind}: {', '.join(stem for stem, one in concerned.items() if one['data'] == kind)}"
         for kind in dict.fromkeys(one["data"] for one in concerned.values())
     )  # held_out: a, b; identification: c
-    rows = gain_rows(errors, ", ".join(methods), data, seed)
+    rows = reconstruct.gain_rows(errors, ", ".join(methods), data, seed)
     unit.write("overall-gain", rows)
     unit.say(gain_sentence(rows) or "no error could be compared")

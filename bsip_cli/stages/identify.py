@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import empty_table
 from bsip_cli.body.inertia import PARAMETERS, UNITS
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
@@ -70,27 +69,23 @@ def run(unit: Unit) -> None:
     first, *others = unit.config.identify.estimators
     estimators = {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
     estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
-    results = {
-        method: uncertainty.readable(estimate, prior) for method, estimate in estimates.items()
-    }
-    tables = [regression.drop(columns=["note", *spread_names()])]
-    for method, result in results.items():
-        unit.say(f"{method}: {estimates[method].note}")
-        tables.append(
-            bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
-        )
+    shares: dict[str, np.ndarray] = {}
+    tables, roots = [regression.drop(columns=["note", *spread_names()])], {RM: prior.root}
+    for method, estimate in estimates.items():
+        unit.say(f"{method}: {estimate.note}")
+        roots[method] = uncertainty.root_of(estimate.covariance)
+        found = uncertainty.readable(estimate, prior)
+        shares[method] = found.share
+        tables.append(bsip_table(method, skeleton.body_names, found.values, found.sd, found.share))
     rarity = _rarity(unit, skeleton, problem, estimates)
     made: dict = {"reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist()}
     made["loads"] = {trial.stem: loads_record(unit, trial) for trial in trials}
     unit.write("bsip", pd.concat(tables, ignore_index=True), made)
-    roots = {
-        method: uncertainty.root_of(estimate.covariance) for method, estimate in estimates.items()
-    }
-    unit.write("covariance", _covariance_table(skeleton, {RM: prior.root} | roots))
+    unit.write("covariance", _covariance_table(skeleton, roots))
     unit.write("base-parameters", _base_table(skeleton, problem))
-    found = uncertainty.excitation(problem)
-    unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
-    summary = _summary(problem, found, estimates, estimators, blocks).assign(**rarity)
+    excited = uncertainty.excitation(problem)
+    unit.write("excitation", _excitation_table(person, problem, excited, shares[OM]))
+    summary = _summary(problem, excited, estimates, estimators, blocks).assign(**rarity)
     unit.write("identification", summary[column_names("identification")], facts)
     unit.write("used-blocks", blocks)
 
@@ -98,15 +93,14 @@ def run(unit: Unit) -> None:
 def _write_table_only(
     unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
 ) -> None:
-    """Without forces that belong to the motion the table's values stand alone."""
     unit.say(
         f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
     unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
     for kind in ("base-parameters", "excitation", "used-blocks"):
-        unit.write(kind, empty_table(kind))
-    unit.write("identification", empty_table("identification"), facts)
+        unit.write(kind, ())
+    unit.write("identification", (), facts)
 
 
 # --- which data -------------------------------------------------------------------------------
@@ -193,12 +187,9 @@ def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.Da
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     fit = base_parameters(problem)
     named = expressions(problem.basis, skeleton.body_names)
-    table = pd.DataFrame(named, columns=["name", "expression", "unit"]).assign(
-        value=fit.values,
-        sd=np.sqrt(np.diag(fit.covariance)),
-        sigma_percent=fit.sigma_percent(),
-        rm_value=fit.rm_values,
-    )
+    table = pd.DataFrame(named, columns=["name", "expression", "unit"])
+    table["value"], table["sd"] = fit.values, np.sqrt(np.diag(fit.covariance))
+    table["sigma_percent"], table["rm_value"] = fit.sigma_percent(), fit.rm_values
     table = table.sort_values("sigma_percent", kind="stable", ignore_index=True)
     return table[column_names("base-parameters")]
 
@@ -213,10 +204,8 @@ def _excitation_table(
         for fixed, own in zip(problem.prior.fixed, share, strict=True)
     ]
     rows = [("condition_number", "", found.condition_number, "1", "", "")]
-    rows += [
-        ("singular_value", str(k + 1), value, "1", "", "")
-        for k, value in enumerate(found.singular_values)
-    ]
+    for k, value in enumerate(found.singular_values, start=1):
+        rows.append(("singular_value", str(k), value, "1", "", ""))
     for k, name in enumerate(names):
         rows += [
             ("segment", name, found.segment_share[k], "1", name, ""),
@@ -225,14 +214,12 @@ def _excitation_table(
         ]
     helpful = advice(problem, person, pinocchio_model(person))
     for quantity, gains in (("movement", helpful.alone), ("next", helpful.together)):
-        rows += [
-            (quantity, g.movement.name, 100 * g.share, "%", names[g.best_segment], g.movement.text)
-            for g in gains
-        ]
-    rows += [
-        ("movement_forces", g.movement.name, 100 * g.wrench, "%", "", g.movement.text)
-        for g in helpful.alone
-    ]
+        for g in gains:
+            most, text = names[g.best_segment], g.movement.text
+            rows.append((quantity, g.movement.name, 100 * g.share, "%", most, text))
+    for g in helpful.alone:
+        name, text = g.movement.name, g.movement.text
+        rows.append(("movement_forces", name, 100 * g.wrench, "%", "", text))
     return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
@@ -253,7 +240,6 @@ def _summary(
         row: dict = {"estimator": estimators[method], "method": method, "note": estimate.note}
         row |= {"trials": ", ".join(blocks["trial"].unique())} | of_all
         row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
-        sd_kg = float(np.sqrt(estimate.covariance[::10, ::10].sum()))
-        row["mass_factor_sd"] = sd_kg / table_kg
+        row["mass_factor_sd"] = float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg
         rows.append(row | dict(zip(names, estimate.residual_rms(problem), strict=True)))
     return pd.DataFrame(rows)

@@ -11,7 +11,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
 from bsip_cli.motion.marker_events import summaries
-from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
+from bsip_cli.motion.marker_evidence import marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.running.unit import Unit
@@ -22,10 +22,8 @@ _MOST_SAID = 5  # of a trial's sentences about single markers
 
 
 def run(unit: Unit) -> None:
-    """Read markers and the person; write kinematics, marker-residuals and marker-events.
-
-    Poses and residuals are those after exchanged labels were corrected.
-    """
+    """Read markers and the person; write kinematics, marker-residuals and marker-events, of the
+    poses after exchanged labels were corrected."""
     person = person_of(unit)
     frame = unit.read("markers")
     times, labels, positions = markers_from(frame)
@@ -33,7 +31,15 @@ def run(unit: Unit) -> None:
     filled = frame["filled"].to_numpy().reshape(len(times), len(labels), 1)
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
     poses, decided = _solved(unit, person, markers)
-    evidence = _evidence(unit, person, markers, filled, times, poses)
+    scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
+
+    def refit(other: np.ndarray, at: np.ndarray) -> MarkerFit:
+        return marker_fit(person, other, _solved(unit, person, other)[0].q, at, **scales)
+
+    fit = marker_fit(person, markers, poses.q, times, **scales)
+    evidence = marker_evidence(fit, refit, filled)
+    for sentence in summaries(evidence.events, _MOST_SAID):
+        unit.say(sentence)
     if evidence.any_corrected():
         poses, decided = _solved(unit, person, evidence.markers_m)
     known, angle_sd = _determined(unit, person, poses, decided)
@@ -68,11 +74,9 @@ def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.
 def _determined(
     unit: Unit, person: Person, poses: Poses, decided: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (N, joints) whose angles the markers decide in a frame as they do in most others.
-
-    A joint beyond an undecided one is undecided too. Also the largest standard deviation (N,) of
-    an angle that most frames decide. The user is informed of what markers do not decide.
-    """
+    """Joints (N, joints) whose angles the markers decide in a frame as they do in most others, but
+    none beyond an undecided one; the largest standard deviation (N,) of an angle that most frames
+    decide. The user is informed of what markers do not decide."""
     skeleton = person.skeleton
     if not decided.all():
         angles = zip(skeleton.joints, np.split(decided, skeleton.v_starts[1:]), strict=True)
@@ -96,26 +100,6 @@ def _determined(
         count = int((~known.all(axis=1)).sum())
         unit.say(f"{count} frames without a pose of {', '.join(lost)}")
     return known, of_joint.max(axis=1)
-
-
-def _evidence(
-    unit: Unit,
-    person: Person,
-    markers: np.ndarray,
-    filled: np.ndarray,
-    times: np.ndarray,
-    poses: Poses,
-) -> Evidence:
-    """Markers that jump, slip, bear another's label or sit wrong; the worst are reported."""
-    scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
-
-    def refit(other: np.ndarray, at: np.ndarray) -> MarkerFit:
-        return marker_fit(person, other, _solved(unit, person, other)[0].q, at, **scales)
-
-    found = marker_evidence(marker_fit(person, markers, poses.q, times, **scales), refit, filled)
-    for sentence in summaries(found.events, _MOST_SAID):
-        unit.say(sentence)
-    return found
 
 
 def _kinematics(

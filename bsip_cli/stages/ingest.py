@@ -10,6 +10,7 @@ import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.errors import BadDataError
+from bsip_cli.recordings import momentum_mass
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
     ContactWindows,
@@ -24,12 +25,6 @@ from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
 from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
 from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.momentum_mass import (
-    Interval,
-    intervals_alone,
-    intervals_of,
-    upright_frames,
-)
 from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.running.unit import Unit
@@ -44,17 +39,11 @@ def run(unit: Unit) -> None:
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
     recording = assemble(opened(unit, unit.own_trial, session.written, session.gains()), session)
     marker_set, about_set = _marker_set(unit, recording)
-    labels, paired = with_pairs_named(
-        recording.labels, recording.markers_m, marker_set, prefix_of(unit)
-    )
+    prefix, seen = prefix_of(unit), np.isfinite(recording.markers_m[..., 0]).any(axis=0)
+    labels, paired = with_pairs_named(recording.labels, recording.markers_m, marker_set, prefix)
     recording = replace(recording, labels=labels)
-    match = match_labels(
-        recording.labels,
-        marker_set.wanted(),
-        optional=marker_set.optional(),
-        seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
-        prefix=prefix_of(unit),
-    )
+    how = {"optional": marker_set.optional(), "seen": seen, "prefix": prefix}
+    match = match_labels(recording.labels, marker_set.wanted(), **how)
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
@@ -72,11 +61,8 @@ def run(unit: Unit) -> None:
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
     stated = asdict(recording.stated)
-    facts = {
-        "marker_set": marker_set.name,
-        "marker_rate_hz": recording.marker_rate_hz,
-        "analog_rate_hz": recording.analog_rate_hz,
-    }
+    rates = {name: getattr(recording, name) for name in ("marker_rate_hz", "analog_rate_hz")}
+    facts = {"marker_set": marker_set.name} | rates
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
     loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
     found = _contacts(unit, recording, filled.markers_m, segments, loads, about)
@@ -141,32 +127,29 @@ def _contacts(
     segments: list[str],
     loads: tuple[PlateLoad, ...],
     stated: StatedMass | None,
-) -> tuple[ContactWindows, tuple[Interval, ...], list[Finding]]:
+) -> tuple[ContactWindows, tuple[momentum_mass.Interval, ...], list[Finding]]:
     """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
     feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
-    intervals = intervals_of(markers, feet.total_N, feet.surely_measured, rate_hz)
+    intervals = momentum_mass.intervals_of(markers, feet.total_N, feet.surely_measured, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
-    alone = intervals_alone(markers, feet, loads, rate_hz)
+    alone = momentum_mass.intervals_alone(markers, feet, loads, rate_hz)
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
     about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
-        loaded = feet.measured & upright_frames(markers)
+        loaded = feet.measured & momentum_mass.upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
     return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
 
 
 def _mass_on_plates(
-    unit: Unit, stated: StatedMass | None, intervals: tuple[Interval, ...]
+    unit: Unit, stated: StatedMass | None, intervals: tuple[momentum_mass.Interval, ...]
 ) -> tuple[float | None, float | None, list[Finding]]:
-    """The mass [kg] on the plates, known loads included, what the trial's plates show for sure, and
-    what is said of both.
-
-    The stated one, unless the trial's plates surely show a grossly different one; without a
-    stated mass what they surely show; else None.
+    """The mass [kg] on the plates, known loads included (the stated one, unless the plates surely
+    show a grossly different one), what the trial's plates show for sure, and what is said of both.
     """
     options = unit.config.ingest
     height_m = unit.person.height_m if stated is None else None
@@ -190,10 +173,8 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     for name, (closed, left, rigid) in zip(names, counts, strict=True):
         if closed or left:
             found = f"{closed + left} of {len(is_open)} frames missing"
-            action = (
-                f"{rigid} filled by the segment's other markers, {closed - rigid} by a spline, "
-                f"{left} left open"
-            )
+            action = f"{rigid} filled by the segment's other markers, {closed - rigid} by a spline"
+            action += f", {left} left open"
             findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
 

@@ -51,6 +51,7 @@ _HELD = "something that no plate measures may bear the person"
 Reasons = dict[str, np.ndarray]  # in words: (N, J) frames and joints that it leaves out
 _SHARED = "nothing shows what each of two hands bears of one load"
 _NO_POSE = "the markers do not determine the pose"
+_FIT = (SegmentInertia, Turned)  # effects with which the motion stays, or is turned as a whole
 
 
 def run(unit: Unit) -> None:
@@ -203,10 +204,8 @@ def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _report(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
-    """Say what is left out, in one sentence: joints of one reason and number of frames together.
-
-    Returns, by joint, what left frames out, in words; empty where nothing did.
-    """
+    """Say what is left out: joints of one reason and number of frames together; by joint, what left
+    frames out, in words, empty where nothing did."""
     joints, parts = trial.person.skeleton.joints[1:], []
     counts = {words: out.sum(axis=0).tolist() for words, out in reasons.items()}
     for words, of_joints in counts.items():
@@ -264,11 +263,9 @@ def turns_of_frames(person: Person, landmark_sd_m: float, largest_rad: float) ->
 
 
 def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations (N, J, 3) of forces and moments by the noise of the accelerations.
-
-    All coordinates are smoothed alike, so their noise at any time is that of the pose, as the
-    markers leave it, times one number, which the pelvis shows.
-    """
+    """Standard deviations (N, J, 3) of forces and moments by the noise of the accelerations: all
+    coordinates are smoothed alike, so it is that of the pose, as the markers leave it, times one
+    number, which the pelvis shows."""
     person = trial.person
     frames = np.flatnonzero(trial.determined)
     shape = (len(trial.q), len(person.skeleton.joints) - 1, 3)
@@ -310,13 +307,10 @@ def _columns(person: Person, q: np.ndarray) -> np.ndarray:
 def _extended(
     unit: Unit, trial: _Trial, bsip: pd.DataFrame, spread: Spread, methods: Sequence[str]
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
-    """Method, loads and valid frames (N, J) of the extended models of this trial.
-
-    Forces freed of the errors of plates and clock, axes of their tilts; parameters as ``extend``
-    found them; what else a segment carries, as a ball in a hand, loads the joints on its way to
-    the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
-    joints or single markers would need another motion: no model with one of them is computed.
-    """
+    """Method, loads and valid frames (N, J) of the extended models of this trial: forces freed of
+    the errors of plates and clock, axes of their tilts; parameters as ``extend`` found them; what
+    else a segment carries, as a ball in a hand, loads the joints on its way to the pelvis. OM's
+    covariance stands for theirs: they come from the same data."""
     causes, extended = causes_of(unit), unit.read("extended-bsip")
     own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
     if not own or extended.empty:
@@ -328,16 +322,11 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        if not all(
-            is_of_the_forces(one)
-            or one.effect.on_its_segment
-            or isinstance(one.effect, (SegmentInertia, Turned))
-            for one in among
-        ):
-            unit.say(
-                f"no joint moments of {method_of(among)}: what moves joints or "
-                "markers would need another motion"
-            )
+        others = (one.effect for one in among if not is_of_the_forces(one))
+        fitting = (one.on_its_segment or isinstance(one, _FIT) for one in others)
+        if not all(fitting):
+            why = "what moves joints or markers would need another motion"
+            unit.say(f"no joint moments of {method_of(among)}: {why}")
             return
         forces = [one for one in among if is_of_the_forces(one)]
         corrected = corrected_plates(replace(scene, valid=trial.measured), forces)

@@ -18,7 +18,6 @@ from bsip_cli.diagnosis.shared_faults import (
     Coordinate,
     Information,
     shared_targets,
-    with_known,
 )
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Number, Parameter
@@ -44,9 +43,6 @@ class Known:
     rows: pd.DataFrame
     own: Mapping[Coordinate, tuple[float, float]]
 
-    def given_to(self, trial: FaultTrial, standing: bool) -> FaultTrial:
-        return with_known(trial, standing, self.coordinates, self.mean, self.root)
-
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""
         named = self.rows[self.rows["verdict"] == "named"]
@@ -57,21 +53,13 @@ class Known:
                 columns = ["parameter", "unit", "estimate", "ci_low", "ci_high"]
                 numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
                 words = effect.words(held[0].scene, str(target), rows["estimate"].to_numpy())
-                known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
+                persons, probability = int(first["persons"]), float(first["probability"])
+                known = f"; this is known from the laboratory ({persons} persons)"
                 own = self._measured_here(effect.parameters(held[0].scene, str(target)), rows)
-                yield Finding(
-                    effect.name,
-                    str(target),
-                    tuple(one.name for one in held),
-                    numbers,
-                    words,
-                    1 - float(first["probability"]),
-                    float(first["probability"]),
-                    scope="laboratory",
-                    persons=int(first["persons"]),
-                    own=own,
-                    closing=interval_words(numbers) + known + _own_words(own, rows),
-                )
+                closing = interval_words(numbers) + known + _own_words(own, rows)
+                what = effect.name, str(target), tuple(one.name for one in held), numbers, words
+                sure, of = (1 - probability, probability), "laboratory"
+                yield Finding(*what, *sure, scope=of, persons=persons, own=own, closing=closing)
 
     def _measured_here(self, parameters: Sequence[Parameter], rows: pd.DataFrame) -> Number | None:
         """A fault's largest number by this person's recordings; None where they say nothing."""
@@ -94,11 +82,10 @@ class Known:
         sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))
         for found in self.findings(trials):
             parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
-            mine = [
-                sizes.get(Coordinate(found.effect, found.target, p.name), x.value / p.typical)
-                * p.typical
-                for p, x in zip(parameters, found.numbers, strict=True)
-            ]
+            mine = []
+            for p, x in zip(parameters, found.numbers, strict=True):
+                at = Coordinate(found.effect, found.target, p.name)
+                mine.append(sizes.get(at, x.value / p.typical) * p.typical)
             yield cause_record(found.effect, found.target, found.trials, np.array(mine))
 
     def _given_no_other(self) -> np.ndarray:
@@ -108,18 +95,14 @@ class Known:
         faults = set(zip(named["effect"], named["target"], strict=True))
         if (PlateRotation.name, ALL) in faults:  # about a middle, so each plate is shifted too
             faults.add((PlateTranslation.name, ALL))
-        kept = np.array(
-            [
-                bool(faults & {(x.effect, x.target), (x.effect, _of_all(x.target))})
-                for x in self.coordinates
-            ]
-        )
+        of_all = [" ".join([ALL, *x.target.split(" ")[1:]]) for x in self.coordinates]
+        pairs = zip(self.coordinates, of_all, strict=True)  # all fz of 1 fz
+        kept = np.array([bool(faults & {(x.effect, x.target), (x.effect, a)}) for x, a in pairs])
         covariance = self.root @ self.root.T
         across, rest = covariance[np.ix_(kept, ~kept)], covariance[np.ix_(~kept, ~kept)]
+        inverse = np.linalg.pinv(rest, rcond=_ROUNDING, hermitian=True)
         mean = np.where(kept, self.mean, 0.0)
-        mean[kept] -= (
-            across @ np.linalg.pinv(rest, rcond=_ROUNDING, hermitian=True) @ self.mean[~kept]
-        )
+        mean[kept] -= across @ inverse @ self.mean[~kept]
         return mean
 
     def limits(self, own: pd.DataFrame) -> pd.DataFrame:
@@ -139,44 +122,30 @@ def _own_words(own: Number | None, rows: pd.DataFrame) -> str:
     (known,) = rows.loc[rows["parameter"] == own.name, "estimate"]
     is_shown = own.low * own.high > 0 and own.value * known > 0
     how = "also show it" if is_shown else "leave it open"
-    return (
-        f", and this person's recordings alone {how}: {own.size()}, 95 % interval {own.interval()}"
-    )
-
-
-def _of_all(target: str) -> str:
-    """Of all plates what is of one: ``all fz`` of ``1 fz``."""
-    return " ".join([ALL, *target.split(" ")[1:]])
+    interval = f"{own.size()}, 95 % interval {own.interval()}"
+    return f", and this person's recordings alone {how}: {interval}"
 
 
 def known_laboratory(unit: Unit) -> Known | None:
     """None where no others were recorded there, or where nobody has asked."""
     if not unit.has("laboratory-information", "laboratory-sums", "laboratory"):
         return None
-    own = unit.read("laboratory-information")
-    persons = {
-        number: mine
-        for number, everybody in unit.facts("laboratory-sums")["persons"].items()
-        if (mine := everybody.get(unit.name))
-    }
-    others = {k: unit.facts("laboratory-sums")["persons"][k].keys() - {unit.name} for k in persons}
-    if len(persons) != 1 or not all(others.values()):
+    everybody = unit.facts("laboratory-sums")["persons"]
+    mine = {number: people for number, people in everybody.items() if people.get(unit.name)}
+    if len(mine) != 1 or any(len(people) < 2 for people in mine.values()):
         return None  # of several laboratories, or alone
-    (number,) = persons
-    pooled = unit.read("laboratory-sums", laboratory=[number])
-    sessions = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
-    posterior = pooled_in(pooled).without(sessions).posterior()
-    at = [k for k, one in enumerate(pooled_in(pooled).coordinates) if one.effect in _FAULTS]
+    (number,) = mine
+    own = unit.read("laboratory-information").groupby("session", sort=False)
+    sessions = [information_in(rows) for _, rows in own]
+    pooled = pooled_in(unit.read("laboratory-sums", laboratory=[number]))
+    posterior = pooled.without(sessions).posterior()
+    at = [k for k, one in enumerate(pooled.coordinates) if one.effect in _FAULTS]
     table = unit.read("laboratory", laboratory=[number], scope=["laboratory"])
     covariance = posterior.covariance[np.ix_(at, at)]
     values, vectors = np.linalg.eigh(covariance)
-    return Known(
-        tuple(pooled_in(pooled).coordinates[k] for k in at),
-        posterior.mean[at],
-        vectors * np.sqrt(np.maximum(values, 0.0)),
-        table,
-        alone(sessions),
-    )
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    coordinates = tuple(pooled.coordinates[k] for k in at)
+    return Known(coordinates, posterior.mean[at], root, table, alone(sessions))
 
 
 def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, float]]:
@@ -221,13 +190,9 @@ def information_in(rows: pd.DataFrame) -> Information:
 def pooled_in(rows: pd.DataFrame) -> Pooled:
     """Of one laboratory's rows of ``laboratory-sums``."""
     roots = rows.filter(regex=r"^root_").dropna(axis=1)
-    return Pooled(
-        coordinates_in(rows),
-        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
-        rows["pull"].to_numpy(),
-        rows["spread"].to_numpy(),
-        roots.to_numpy(),
-    )
+    precision = rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy()
+    pull, spread = rows["pull"].to_numpy(), rows["spread"].to_numpy()
+    return Pooled(coordinates_in(rows), precision, pull, spread, roots.to_numpy())
 
 
 def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:

@@ -37,9 +37,7 @@ from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
 _LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.3 s on the plates
-_SAME_PLACE_M = (
-    0.02  # of every corner: what laboratories meet of a plate that is not where it is said
-)
+_SAME_PLACE_M = 0.02  # of every corner: what laboratories meet of a plate not where it is said
 _MOVED = 0.1  # of its standard deviation: less makes no diagnosis untrue
 _UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
@@ -75,27 +73,20 @@ def run_person(unit: Unit) -> None:
                 "moments_s": [float(moments.mean()), float(moments.std())],
             }
     if not sessions:
-        unit.warn(
-            f"{unit.name}: no trial has motion with every contact on a plate; it shows nothing of "
-            "the laboratory"
-        )
+        why = "no trial has motion with every contact on a plate"
+        unit.say(f"{why}; it shows nothing of the laboratory")
     facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
     unit.write("laboratory-information", rows, facts)
 
 
 def _session_rows(session: str, information: Information) -> list[dict]:
     numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
-    return [
-        {
-            "session": session,
-            **vars(one),
-            **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
-            "trials": int(trials),
-            "pull": information.pull[k],
-            **{f"precision_{j}": x for j, x in enumerate(information.precision[k])},
-        }
-        for k, (one, parameter, trials) in enumerate(numbers)
-    ]
+    rows: list[dict] = []
+    for k, (one, parameter, trials) in enumerate(numbers):
+        row = {"session": session, **vars(one), "trials": int(trials), "pull": information.pull[k]}
+        row |= {name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")}
+        rows.append(row | {f"precision_{j}": x for j, x in enumerate(information.precision[k])})
+    return rows
 
 
 # --- all together ---------------------------------------------------------------------------------
@@ -103,11 +94,8 @@ def _session_rows(session: str, information: Information) -> list[dict]:
 
 @dataclass(frozen=True, eq=False)
 class _Session:
-    """One session of a person.
-
-    plates : corners (4, 3) in the world by name. moments_s : mean and standard deviation of those
-    that show the clock.
-    """
+    """Of a person. plates : corners (4, 3) in the world by name. moments_s : mean and standard
+    deviation of those that show the clock."""
 
     name: str
     person: str
@@ -139,12 +127,9 @@ def run(unit: Unit) -> None:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
         rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
-    facts = {
-        "persons": {
-            str(k): {s.person: s.name for s in one} for k, one in enumerate(laboratories, start=1)
-        },
-        "answer": _answer(unit, found),
-    }
+    numbered = enumerate(laboratories, start=1)
+    persons = {str(k): {s.person: s.name for s in one} for k, one in numbered}
+    facts = {"persons": persons, "answer": _answer(unit, found)}
     table = pd.DataFrame(rows, columns=column_names("laboratory"))
     for sentence in named_sentences(table):
         unit.warn(sentence)
@@ -163,16 +148,12 @@ def _answer(unit: Unit, found: Mapping[str, laboratory_search.Laboratory]) -> di
         numbers = zip(names, posterior.mean.tolist(), sd.tolist(), strict=True)
         now[number] = {name: [mean, spread] for name, mean, spread in numbers}
     before = unit.said_before("laboratory-sums").get("answer", {})
-    return before if _is_near(before, now) else now
-
-
-def _is_near(before: Mapping, now: Mapping) -> bool:
     if before.keys() != now.keys() or any(before[k].keys() != now[k].keys() for k in now):
-        return False
+        return now
     pairs = [(before[k][name], now[k][name]) for k in now for name in now[k]]
     moved = np.abs(np.array([np.subtract(new, old) for old, new in pairs]))
     spread = np.array([min(old[1], new[1]) for old, new in pairs])
-    return bool((moved < _MOVED * spread[:, None]).all())
+    return before if (moved < _MOVED * spread[:, None]).all() else now
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -184,19 +165,13 @@ def _sessions(unit: Unit) -> Iterator[_Session]:
             continue
         table = unit.read("laboratory-information", participant=participant)
         facts = unit.facts("laboratory-information", participant=participant)
-        for session in dict.fromkeys(table["session"]):
-            rows = table[table["session"] == session]
-            name = f"{participant.id}_ses-{session}" if session else participant.id
-            plates = facts["sessions"][session]["plates"]
-            mean_s, sd_s = facts["sessions"][session]["moments_s"]
-            yield _Session(
-                name,
-                participant.id,
-                information_in(rows),
-                facts["mass_sd"] or _UNWEIGHED,
-                {plate: np.array(corners) for plate, corners in plates.items()},
-                (mean_s, sd_s),
-            )
+        for session, rows in table.groupby("session", sort=False):
+            name = "_ses-".join(filter(None, (participant.id, str(session))))
+            known = facts["sessions"][session]
+            plates = {plate: np.array(corners) for plate, corners in known["plates"].items()}
+            information, mass_sd = information_in(rows), facts["mass_sd"] or _UNWEIGHED
+            whose = name, participant.id, information, mass_sd
+            yield _Session(*whose, plates, tuple(known["moments_s"]))
 
 
 def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
@@ -221,13 +196,8 @@ def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
 def _fitted(unit: Unit, sessions: Sequence[_Session]) -> laboratory_search.Laboratory:
     mine = unit.config.laboratory
     mean_s, sd_s = np.mean([one.moments_s for one in sessions], axis=0).tolist()
-    persons = persons_of(
-        [one.information for one in sessions],
-        [one.mass_sd for one in sessions],
-        mine.between_persons,
-        mine.alike,
-        (mean_s, sd_s),
-    )
+    known = [one.information for one in sessions], [one.mass_sd for one in sessions]
+    persons = persons_of(*known, mine.between_persons, mine.alike, (mean_s, sd_s))
     centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
     causes = laboratory_search.causes_of(persons, centres)
     return laboratory_search.laboratory_of(persons, causes, unit.config.diagnosis.fault_prior_odds)
@@ -251,13 +221,10 @@ def _rows(
         them = [sessions[k] for k in deviation.sessions]
         who = them[0].name if len(them) == 1 else ""
         where = f"in {who}" if who else f"from {them[0].name} on"
-        cells = {
-            "since": "" if who else them[0].name,
-            "sentence": f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}",
-            "laboratory": laboratory,
-            "scope": "person" if deviation.cause.effect == STATED_MASS.name else "session",
-            "who": who,
-        }
+        what = f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}"
+        scope = "person" if deviation.cause.effect == STATED_MASS.name else "session"
+        cells = {"since": "" if who else them[0].name, "sentence": what}
+        cells |= {"laboratory": laboratory, "scope": scope, "who": who}
         yield from _rows_of(deviation, _counts(them, deviation.cause), cells)
 
 
@@ -266,7 +233,6 @@ def _rows_of(
     counts: tuple[int, int],
     cells: Mapping[str, str],
 ) -> Iterator[dict]:
-    """One for each number of a cause; counts : persons and trials that show it."""
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
     for x in found.sizes:
@@ -306,10 +272,9 @@ def _effect(cause: laboratory_search.Cause) -> Effect:
 
 
 def _words(cause: laboratory_search.Cause, sizes: Sequence[laboratory_search.Size]) -> str:
+    known = [(x.parameter, x.value, x.low, x.high) for x in sizes]
+    numbers = tuple(Number(one.name, one.unit, *of) for one, *of in known)
     values = np.array([one.value for one in sizes])
-    numbers = tuple(
-        Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in sizes
-    )
     words = _effect(cause).words(_NO_SCENE, cause.target, values)
     return words.what + interval_words(numbers)
 
@@ -323,12 +288,13 @@ def _sentence(
 ) -> str:
     words, remedy = _words(cause, sizes), _effect(cause).remedy
     shown = f"by {count(counts[0], 'person')} and {count(counts[1], 'recording')}"
-    if said == "named":
-        return f"{words}, {shown}; to make sure, {remedy}"
-    if said == "ambiguous":
-        return f"perhaps {words}, {shown}; other causes look alike here: {remedy}"
-    if said == "inconclusive":
-        return f"inconclusive: {words}; no possible size would have been named {shown}"
+    plain = {
+        "named": f"{words}, {shown}; to make sure, {remedy}",
+        "ambiguous": f"perhaps {words}, {shown}; other causes look alike here: {remedy}",
+        "inconclusive": f"inconclusive: {words}; no possible size would have been named {shown}",
+    }
+    if said in plain:
+        return plain[said]
     best = min(sizes, key=lambda one: one.limit / one.parameter.typical)
     factor, unit = readable_unit(best.parameter.name, best.parameter.unit)
     limit = with_unit(f"{factor * best.limit:.{digits_of(factor * best.limit)}f}", unit)

@@ -100,16 +100,11 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
 def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
     """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
     none; else nothing is known to be wrong with either, and the stated one stays."""
-    measured = comparison.measured
-    plates_kg = measured.mass_kg if is_sure else float("nan")
-    sentence = comparison.sentence(stated.source)
+    plates_kg = comparison.measured.mass_kg if is_sure else float("nan")
+    used, source = plates_kg, PLATES if is_sure else UNKNOWN
     if not comparison.likely():
         used, source = stated.mass_kg, stated.source
-    elif is_sure:
-        used, source = measured.mass_kg, PLATES
-    else:
-        used, source = float("nan"), UNKNOWN
     what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"
-    note = f"{sentence}; {what}: correct mass_kg in participants.tsv"
+    note = f"{comparison.sentence(stated.source)}; {what}: correct mass_kg in participants.tsv"
     unit.say(note)
     return PersonMass(used, source, plates_kg, note)

@@ -46,7 +46,13 @@ def run(unit: Unit) -> None:
     judgement = judgement_of(unit, kinematics, measured)
     if not judgement.judged.any():
         unit.say("no interval in which every contact is on a plate; nothing to judge")
-    wrenches, signals = judgement.compared(_wrenches(unit, person, kinematics, measured))
+    methods, phi = parameters_of(unit.read("bsip"), person)
+    phi = phi + load_phi(unit, person)[:, None]  # known loads included
+    motion = coordinates_from(kinematics, person.skeleton)
+    simulated = predicted_wrench(pinocchio_model(person), *motion, phi, np.zeros(3))
+    raw = {MEASURED: measured[WRENCH].to_numpy()}
+    raw |= {name: simulated[..., k] for k, name in enumerate(methods)}
+    wrenches, signals = judgement.compared(raw)
     rows = reconstruction_rows(judgement, wrenches, signals)
     unit.write("reconstruction", rows, facts={"loads": loads_record(unit)})
     compared = over_the_same_frames(signals)
@@ -59,18 +65,6 @@ def run(unit: Unit) -> None:
         for name, one in compared.items()
     ]
     unit.write("posturography", sway)
-
-
-def _wrenches(
-    unit: Unit, person: Person, kinematics: pd.DataFrame, measured: pd.DataFrame
-) -> Wrenches:
-    """Measured, and simulated by each method, known loads included."""
-    methods, phi = parameters_of(unit.read("bsip"), person)
-    phi = phi + load_phi(unit, person)[:, None]
-    q, v, a = coordinates_from(kinematics, person.skeleton)
-    simulated = predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))
-    wrenches = {MEASURED: measured[WRENCH].to_numpy()}
-    return wrenches | {name: simulated[..., k] for k, name in enumerate(methods)}
 
 
 # --- how a trial is judged ----------------------------------------------------------------------
@@ -117,13 +111,11 @@ def over_the_same_frames(signals: Signals) -> Signals:
     """
     compared = [signals[name] for name in (MEASURED, *METHODS) if name in signals]
     known = np.isfinite([one["cop_ap"] for one in compared]).all(axis=0)
-    return {
-        name: {
-            component: np.where(known, values, np.nan) if component.startswith("cop") else values
-            for component, values in one.items()
-        }
-        for name, one in signals.items()
-    }
+    same = {}
+    for name, one in signals.items():
+        cop = {c: np.where(known, one[c], np.nan) for c in ("cop_ap", "cop_ml")}
+        same[name] = {**one, **cop}
+    return same
 
 
 def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -> Judgement:

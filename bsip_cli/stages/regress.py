@@ -42,11 +42,8 @@ def run(unit: Unit) -> None:
 
 
 def _lengths_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
-    """(n, 3) by how much [% of the rod's length] centres of mass err because lengths do.
-
-    The table puts them at parts of the length, so they err by the same part of its error: after
-    refinement, or of the first guess where a length is not refined.
-    """
+    """(n, 3) by how much [% of the rod's length] centres of mass err because lengths do: by the
+    same part, after refinement, or of the first guess where a length is not refined."""
     rows = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
     part = (rows["length_sd_m"] / rows["length_m"]).fillna(unit.config.scale.length_sd)
     centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in inertias])

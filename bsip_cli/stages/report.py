@@ -10,18 +10,11 @@ from pathlib import Path
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
+from bsip_cli.report import records
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.cohort import record as cohort
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
-from bsip_cli.report.records import (
-    HowMade,
-    Origin,
-    ParticipantRecord,
-    Refusal,
-    TrialRecord,
-    with_all_causes,
-)
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
@@ -29,17 +22,14 @@ from bsip_cli.stages.frames import load_words, person_of
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 
+# Field of a trial's record: kind of artifact.
 _KINDS = ("quality", "kinematics", "marker-events", "reconstruction", "fit", "joint-moments")
-_TABLES = {"residuals": "marker-residuals"} | {  # field of a trial's record: kind of artifact
-    kind.replace("-", "_"): kind for kind in (*_KINDS, "joint-peaks")
-}
+_TABLES = {"residuals": "marker-residuals", "joint_peaks": "joint-peaks"}
+_TABLES |= {kind.replace("-", "_"): kind for kind in _KINDS}
 _DIGITS = "%.6g"  # of a number in a CSV file
-_FOUND = {  # field of a participant's record: kind that is there only if its stage has run
-    "diagnosis": "overall-diagnosis",
-    "detection": "detection",
-    "budget": "overall-error-budget",
-    "choice": "choice",
-}
+# Field of a participant's record: kind that is there only if its stage has run.
+_FOUND = {"diagnosis": "overall-diagnosis", "budget": "overall-error-budget"}
+_FOUND |= {kind: kind for kind in ("detection", "choice")}
 
 
 def run(unit: Unit) -> None:
@@ -47,12 +37,8 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts = {
-        "light": asdict(light),
-        "large": large_finding(record),
-        "first": must_wait(record),
-        "use": use_now(record),
-    }
+    facts: dict = {"light": asdict(light), "large": large_finding(record)}
+    facts |= {"first": must_wait(record), "use": use_now(record)}
     unit.write("report-files", rows, facts=facts)
 
 
@@ -73,27 +59,22 @@ def write_page(unit: Unit, document: Document) -> list[Path]:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def record_of(unit: Unit) -> ParticipantRecord:
+def record_of(unit: Unit) -> records.ParticipantRecord:
     """Everything that is there of the unit's participant."""
     usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
     trials = sorted(unit.person.trials, key=lambda trial: list(ROLES).index(trial.role))
-    return ParticipantRecord(
-        id=unit.person.id,
+    person, days = unit.person.id, unit.config.laboratory.recorded_on.items()
+    return records.ParticipantRecord(
+        id=person,
         facts=unit.read("person").iloc[0],
-        bsip=unit.read("bsip"),
-        excitation=unit.read("excitation"),
-        identification=unit.read("identification"),
+        **{kind: unit.read(kind) for kind in ("bsip", "excitation", "identification")},
         body=person_of(unit),
         trials=tuple(_trial_record(unit, trial, usable) for trial in trials),
         refusals=refusals_of(unit, unit.person),
-        origins=_origins(unit, usable),
+        origins=tuple(_origins(unit, usable)),
         defaults=unit.shipped_options(),
         made_on=date.today().isoformat(),
-        recorded_on=tuple(
-            day
-            for name, day in unit.config.laboratory.recorded_on.items()
-            if name.partition("_ses-")[0] == unit.person.id
-        ),
+        recorded_on=tuple(day for name, day in days if name.partition("_ses-")[0] == person),
         loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),
@@ -107,49 +88,47 @@ def _extended(unit: Unit, kind: str) -> pd.DataFrame | None:
     there = unit.has("bsip-change") and unit.has(kind)
     if not there or not is_made_from(unit.path("bsip-change"), unit.path("overall-diagnosis")):
         return None
-    return with_all_causes(unit.read(kind))
+    return records.with_all_causes(unit.read(kind))
 
 
-def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> TrialRecord:
+def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> records.TrialRecord:
     tables = {
         name: unit.read(kind, trial) if trial in usable[kind] else None
         for name, kind in _TABLES.items()
     }
     for name in ("reconstruction", "fit"):
         table = tables[name]
-        tables[name] = with_all_causes(table) if table is not None else None
-    return TrialRecord(trial.stem, trial.task, trial.role, **tables)
+        tables[name] = records.with_all_causes(table) if table is not None else None
+    return records.TrialRecord(trial.stem, trial.task, trial.role, **tables)
 
 
-def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
+def refusals_of(unit: Unit, participant: Participant) -> tuple[records.Refusal, ...]:
     """What earlier stages refused of a participant and the trials."""
     found = []
     for path in sorted((unit.out / participant.id).glob("*_refusal-*.parquet")):
         owner = path.name.split("_refusal-")[0]
         label = "" if owner == participant.id else trial_label(owner)
         rows = read_artifact(path, "refusal").to_dict("records")
-        found += [Refusal(label, x["stage"], x["sentence"]) for x in rows]
+        found += [records.Refusal(label, x["stage"], x["sentence"]) for x in rows]
     return tuple(one for one in found if one.stage != unit.stage.name)
 
 
-def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
-    origins = []
+def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> Iterator[records.Origin]:
     for kind in unit.stage.inputs:
-        if SCHEMAS[kind].level == "participant":
-            origins += [origin_of(unit.path(kind), "")] if unit.has(kind) else []
-        else:
-            there = (trial for trial in unit.person.trials if trial in usable[kind])
-            origins += [origin_of(unit.path(kind, one), trial_label(one.stem)) for one in there]
-    return tuple(origins)
+        if SCHEMAS[kind].level == "trial":
+            for one in (trial for trial in unit.person.trials if trial in usable[kind]):
+                yield origin_of(unit.path(kind, one), trial_label(one.stem))
+        elif unit.has(kind):
+            yield origin_of(unit.path(kind), "")
 
 
-def origin_of(path: Path, label: str) -> Origin:
+def origin_of(path: Path, label: str) -> records.Origin:
     """Provenance of one artifact."""
     provenance = read_header(path)["provenance"]
     made_by = provenance["made_by"]
     known = ("stage", "bsip_version", "libraries", "options", "inputs")
     made = {name: made_by[name] for name in known}
-    return Origin(label, messages=tuple(provenance["messages"]), **made)
+    return records.Origin(label, messages=tuple(provenance["messages"]), **made)
 
 
 # --- the cohort ---------------------------------------------------------------------------------
@@ -189,14 +168,13 @@ def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
             + listing([tag.removeprefix("table") for tag in gone["tables"]])
             for gone in facts["missing"]
         ),
-        made=HowMade.of(_origins_of_all(unit)),
+        made=records.HowMade.of(_origins_of_all(unit)),
         defaults=unit.shipped_options(),
         laboratory=unit.read("laboratory") if unit.has("laboratory") else None,
     )
 
 
 def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
-    """A participant's table; empty where there is none."""
     there = unit.path(kind, participant=participant).exists()
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
@@ -222,31 +200,19 @@ def _member(
         kind: {name: rows[name].iloc[0] for name in cohort.SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()
     }
-    has_page, was_searched = (
-        unit.path(kind, participant=participant).exists()
-        for kind in ("report-files", "overall-diagnosis")
-    )
     searched, light = None, None
-    if was_searched:
+    if unit.path("overall-diagnosis", participant=participant).exists():
         facts = unit.facts("overall-diagnosis", participant=participant)
         diagnosis = unit.read("overall-diagnosis", participant=participant)
         searched = cohort.searched(participant.id, diagnosis, facts)
-    if has_page:
+    if has_page := unit.path("report-files", participant=participant).exists():
         light = Light(**unit.facts("report-files", participant=participant)["light"])
-    return cohort.Member(
-        participant.id,
-        first["person"],
-        first["identification"],
-        has_page,
-        refusals_of(unit, participant),
-        searched,
-        use if errors else "",
-        errors,
-        light,
-    )
+    known = participant.id, first["person"], first["identification"], has_page
+    refusals = refusals_of(unit, participant)
+    return cohort.Member(*known, refusals, searched, use if errors else "", errors, light)
 
 
-def _origins_of_all(unit: Unit) -> Iterator[Origin]:
+def _origins_of_all(unit: Unit) -> Iterator[records.Origin]:
     """Of all that is read; a participant's own facts are no options of the group, and what a
     diagnosis found has its section."""
     for kind in unit.stage.inputs:

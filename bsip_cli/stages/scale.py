@@ -64,11 +64,11 @@ def run(unit: Unit) -> None:
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
     ahead = calibration.anterior
-    row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
-    row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
     statures = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
     # how the markers' height differs from the stated one, which ingest has said
     fault = statures.against(height_m) if statures is not None and height_m is not None else None
+    row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
+    row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
     row |= {"height_note": "; ".join((fault[0], fault[2])) if fault else ""}
     row |= {"anterior_x": ahead[0], "anterior_y": ahead[1]}
     row |= {"calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m()}
@@ -126,7 +126,6 @@ def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
 
 
 def _warn_strangers(unit: Unit, marker_set: MarkerSet, recorded: list[_Recorded]) -> None:
-    """Of trials whose labels were taken for other markers than the calibrating trial's."""
     known = {marker.label for marker in marker_set.markers}
     for one in recorded:
         strange = [label for label in one.labels if label not in known]
@@ -148,19 +147,16 @@ def _calibrating_trial(unit: Unit, recorded: list[_Recorded]) -> _Recorded:
             expected="at least one",
             remedy="see what ingest refused",
         )
-    for one in recorded:
-        if one.trial.role == "static":
-            return one
+    if static := [one for one in recorded if one.trial.role == "static"]:
+        return static[0]
     quietest = min(recorded, key=lambda one: _unrest(one)[0])
     unit.say(f"no static trial; the quietest second of {quietest.trial.stem} calibrates")
     return quietest
 
 
 def _unrest(one: _Recorded) -> tuple[float, slice]:
-    """Mean marker speed [m/s] in the quietest second, and that second.
-
-    Among the seconds that show nearly as many markers as the best: people walk in and out.
-    """
+    """Mean marker speed [m/s] in the quietest second, and that second, among those that show nearly
+    as many markers as the best: people walk in and out."""
     step = float(np.median(np.diff(one.times))) if len(one.times) > 1 else 1.0
     width = min(max(2, round(_QUIET_S / step)), len(one.times))
     if width < 3:
@@ -178,7 +174,6 @@ def _unrest(one: _Recorded) -> tuple[float, slice]:
 
 
 def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
-    """Label to mean position over the frames in which the marker is visible."""
     tracks = zip(one.labels, one.positions[frames].swapaxes(0, 1), strict=True)
     seen = {label: track[np.isfinite(track[:, 0])] for label, track in tracks}
     return {label: places.mean(axis=0) for label, places in seen.items() if len(places)}

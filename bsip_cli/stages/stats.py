@@ -131,8 +131,7 @@ class _Cohort:
         return values
 
     def _lacks(self, what: str, *numbers: int, is_reported: bool = False) -> None:
-        """`what` ("sub-02 has no ...") is not in the tables with these numbers: a message says it,
-        unless that is done."""
+        """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
         if not is_reported:
             tables = f"table{'s' * (len(numbers) > 1)} {listing([*map(str, numbers)])}"
             self._unit.warn(f"{what}: not in {tables}")
@@ -143,10 +142,8 @@ class _Cohort:
             self._lacks(f"{participant.id} has no identified parameters", 1, 6)
             return None
         frame = self._unit.read("bsip", participant=participant)
-        lacking = [method for method in (OM, RM) if method not in set(frame["method"])]
-        if lacking:
-            what = f"{participant.id} has no parameters of {' and '.join(lacking)}"
-            self._lacks(what, 1, 6)
+        if lacking := [method for method in (OM, RM) if method not in set(frame["method"])]:
+            self._lacks(f"{participant.id} has no parameters of {' and '.join(lacking)}", 1, 6)
         return frame
 
     def _recordings(self, participant: Participant) -> Iterator[Recording]:
@@ -203,7 +200,6 @@ class Recording:
 
 
 def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
-    """The rows of these methods as plain dictionaries."""
     return frame[frame["method"].isin(methods)].to_dict("records")  # type: ignore[return-value]
 
 

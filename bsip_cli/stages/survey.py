@@ -105,14 +105,9 @@ def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict
         masses.append(recording.stated.mass_kg)
         for plate, intervals in masses_alone(recording).items():
             shown.setdefault(plate, {})[trial.stem] = intervals
-    options = unit.config.ingest
-    return plate_gains(
-        shown,
-        next((kg for kg in masses if kg is not None), None),
-        options.mass_half_width_percent,
-        options.mass_tolerance_percent,
-        options.mass_gross_percent,
-    )
+    options, stated_kg = unit.config.ingest, next((kg for kg in masses if kg is not None), None)
+    limits = options.mass_half_width_percent, options.mass_tolerance_percent
+    return plate_gains(shown, stated_kg, *limits, options.mass_gross_percent)
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> set[str]:
@@ -203,22 +198,17 @@ def _row(verdict: Verdict) -> dict:
 def _verdict(row: dict) -> Verdict:
     centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
     same = ("moment_scale", "point_scale", "about", "place_of", "channels")
-    reading = PlateReading(
-        **{name: row[name] for name in same},
-        centre_m=None if pd.isna(centre[0]) else centre,
-        turn=int(row["turn"]),
-        mirrored=bool(row["reversed_round"]),
-        sign=int(row["sign"]),
-        half_size_m=None if pd.isna(half[0]) else half,
-    )
+    known = {name: row[name] for name in same} | {"mirrored": bool(row["reversed_round"])}
+    known |= {"turn": int(row["turn"]), "sign": int(row["sign"])}
+    known |= {"centre_m": None if pd.isna(centre[0]) else centre}
+    reading = PlateReading(**known, half_size_m=None if pd.isna(half[0]) else half)
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
     others, repeats = filter(None, row["rivals"].split("|")), row["repeats"].split()
     said = {name: row[name] for name in ("refusal", "doubted", "gain")}
-    return Verdict(
-        reading, before, after, alternatives=tuple(others), repeats=tuple(repeats), **said
-    )
+    said |= {"alternatives": tuple(others), "repeats": tuple(repeats)}
+    return Verdict(reading, before, after, **said)
 
 
 def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:
@@ -227,11 +217,9 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
     if not rows:
         return SessionReading()
     first = rows[0]
-    frame = FrameChange(
-        **{name: first[name] for name in ("moved", "turned_deg", "turned_sd_deg", "unsure_m")},
-        axis=int(first["axis"]),
-        corners_only=bool(first["corners_only"]),
-    )
+    known = {name: first[name] for name in ("moved", "turned_deg", "turned_sd_deg", "unsure_m")}
+    axis, is_of_corners = int(first["axis"]), bool(first["corners_only"])
+    frame = FrameChange(**known, axis=axis, corners_only=is_of_corners)
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
     written = {name: facts[name].get(trial.stem, 1.0) for name in asdict(AS_WRITTEN)}
     of_trials = {name: facts[name] for name in _OF_TRIALS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -28,24 +29,19 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     Known loads are part of what is simulated. The markers bear the labels that the poses rest on.
     """
     times, labels, positions = markers_from(unit.read("markers", trial))
-    markers = ordered_markers(labels, positions, person.markers)
-    markers = with_labels_corrected(
-        markers, times, person.markers, unit.read("marker-events", trial)
-    )
+    markers, events = ordered_markers(labels, positions, person.markers), "marker-events"
+    markers = with_labels_corrected(markers, times, person.markers, unit.read(events, trial))
     scene = motion_and_wrench_of(unit, person, phi, trial)
     plates = plates_of(unit.read("plates", trial), unit.read("wrench", trial))
     zeros = unit.facts("wrench", trial).get("zeros", {})
     rates = (unit.facts("markers", trial)[f"{what}_rate_hz"] for what in ("marker", "analog"))
     resampled = not np.isclose(*rates)
-    return replace(
-        scene,
-        plates=tuple(
-            replace(p, zeroed=p.name in zeros, silent=silent_frames(p.wrench, resampled))
-            for p in plates
-        ),
-        robust_limit_m=unit.config.ik.robust_limit_m,
-        residual_m=marker_residuals(person, scene.q, markers),
+    plates = tuple(
+        replace(p, zeroed=p.name in zeros, silent=silent_frames(p.wrench, resampled))
+        for p in plates
     )
+    limit_m, residual_m = unit.config.ik.robust_limit_m, marker_residuals(person, scene.q, markers)
+    return replace(scene, plates=plates, robust_limit_m=limit_m, residual_m=residual_m)
 
 
 def motion_and_wrench_of(
@@ -78,10 +74,8 @@ def with_labels_corrected(
 
 def plate_names(wrench: pd.DataFrame) -> tuple[str, ...]:
     """Of the plates whose readings a ``wrench`` table holds."""
-    columns = (str(c) for c in wrench)
-    return tuple(
-        c.removeprefix("plate").removesuffix("_fx_N") for c in columns if c.endswith("_fx_N")
-    )
+    found = (re.fullmatch(r"(?:plate)?(.*)_fx_N", str(column)) for column in wrench)
+    return tuple(one[1] for one in found if one)
 
 
 def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:

@@ -102,7 +102,6 @@ def _log_error(residuals: np.ndarray, intervals: Intervals) -> tuple[float, np.n
 
 # --- how much smaller an error becomes, with an interval from whole blocks of time ----------------
 
-
 _DRAWS = 500
 
 

@@ -75,16 +75,13 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
             families[row.topic.table, row.test, row.method_b].append(place)
     corrected = list(comparisons)
     for places in families.values():
-        adjusted = samples.adjusted_p_values(
-            [comparisons[place].p_value for place in places], "holm"
-        )
+        adjusted = samples.adjusted_p_values([comparisons[place].p_value for place in places])
         for place, p in zip(places, adjusted, strict=True):
             corrected[place] = replace(comparisons[place], p_holm=p)
     return tuple(corrected)
 
 
 # --- values, and those that belong to one line of a table -----------------------------------------
-
 
 DIFFERENCE = f"|{OM}-{RM}|"  # the method of a value that is how far both are apart
 OVER_TASKS = ("table2", "table3", "table6")
@@ -210,15 +207,10 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
     normality = samples.lilliefors_test(np.subtract(*samples.finite_pairs(pair.x, pair.y)))
-    by_t = pair.row(
-        "paired_t",
-        pair.origin,
-        test,
-        effect_size=cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b),
-        effect_size_name=f"Cohen's d (pooled SD, {pair.other} - OM)",
-        lilliefors_p=normality.p_value,
-        reason=test.reason or normality.reason,
-    )
+    more: dict[str, Any] = {"effect_size_name": f"Cohen's d (pooled SD, {pair.other} - OM)"}
+    more["effect_size"] = cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b)
+    more |= {"lilliefors_p": normality.p_value, "reason": test.reason or normality.reason}
+    by_t = pair.row("paired_t", pair.origin, test, **more)
     d_z = samples.TestResult(n=test.n, difference=test.difference, reason=test.reason)
     d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
     ranks = wilcoxon(pair.x, pair.y)
@@ -276,9 +268,8 @@ def methods_compared(
         for (i, j), p in differences.items():
             means = described_pair(table[:, i], table[:, j])  # also where no test was possible
             numbers = vars(post_hoc.get((i, j), means.with_(reason=test.reason)))
-            numbers = (
-                numbers | {name: getattr(means, name) for name in _MEANS} | {"lilliefors_p": p}
-            )
+            of_means = {name: getattr(means, name) for name in _MEANS}
+            numbers = {**numbers, **of_means, "lilliefors_p": p}
             pair = methods[i], methods[j]
             yield Comparison(topic, f"bonferroni_{after}", origin, *pair, **numbers)
 
@@ -289,36 +280,26 @@ def methods_compared(
 def tests_of(values: Iterable[Value], criteria: Criteria) -> Iterator[Comparison]:
     """Every test of the topics that these values belong to; all of a topic's must be there."""
     for topic, group in topics(v for v in values if v.method != PAIR).items():
-        yield from _tests_of_topic(topic, group, criteria)
-
-
-def _tests_of_topic(
-    topic: Topic, values: Sequence[Value], criteria: Criteria
-) -> Iterator[Comparison]:
-    table, alpha = topic.table, criteria.alpha
-    only_described = table == "table5" and not topic.variable.endswith("_rmse")
-    is_published = table in ("table1", "table2") or only_described
-    for method, is_it in (
-        (OM, topic.variable.endswith(DATA_SHARE)),
-        (DIFFERENCE, all(value.method == DIFFERENCE for value in values)),
-    ):
-        if is_it:
-            yield description(topic, method, values)
-            return
-    if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
-        methods = (MEASURED, OM, RM)
-        columns = per_participant(values, methods)
-        yield from methods_compared(topic, columns, methods, alpha)
-    for pair in pairs_of(topic, values, "published" if is_published else "added"):
-        if only_described:  # means and SDs
-            means = described_pair(*samples.finite_pairs(pair.x, pair.y))
-            yield pair.row("description", pair.origin, means)
-        elif table != "table3" or pair.other != RM:
-            yield from t_and_rank_tests(pair, alpha)
-            if table == "table1":
-                yield equivalence(pair, criteria)
-            elif table in ("table2", "table4", "table5"):
-                yield smaller_error(pair)
+        table, alpha = topic.table, criteria.alpha
+        is_share = topic.variable.endswith(DATA_SHARE)
+        if is_share or all(value.method == DIFFERENCE for value in group):
+            yield description(topic, OM if is_share else DIFFERENCE, group)
+            continue
+        if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
+            methods = (MEASURED, OM, RM)
+            yield from methods_compared(topic, per_participant(group, methods), methods, alpha)
+        only_described = table == "table5" and not topic.variable.endswith("_rmse")
+        is_published = table in ("table1", "table2") or only_described
+        for pair in pairs_of(topic, group, "published" if is_published else "added"):
+            if only_described:  # means and SDs
+                means = described_pair(*samples.finite_pairs(pair.x, pair.y))
+                yield pair.row("description", pair.origin, means)
+            elif table != "table3" or pair.other != RM:
+                yield from t_and_rank_tests(pair, alpha)
+                if table == "table1":
+                    yield equivalence(pair, criteria)
+                elif table in ("table2", "table4", "table5"):
+                    yield smaller_error(pair)
 
 
 # --- does OM follow the measured signal better than RM? One test per participant, then counts -----
@@ -387,24 +368,22 @@ class PersonTestCounts:
                 self._numbers[key].append((found.statistic, found.p_value))
                 self._reasons[key] |= {found.reason} if found.reason else set()
 
-    def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
+    def comparisons(self, alpha: float) -> Iterator[Comparison]:
         """Median t and p of each topic, and in how many participants OM or RM is better."""
-        return tuple(Comparison(*key, OM, RM, **self._of(key, alpha)) for key in self._numbers)
-
-    def _of(self, key: tuple[Topic, str, Origin], alpha: float) -> dict[str, Any]:
-        numbers, reasons = np.array(self._numbers[key]), self._reasons[key]
-        total = len(numbers)
-        t, p = numbers[~np.isnan(numbers[:, 1])].T
-        better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
-        like = ", for instance" if len(reasons) > 1 else ""
-        concerned = f"in {total - len(p)} of {total} participants{like}"
-        return {
-            "n": len(p),
-            "statistic": float(np.median(t)) if len(p) else nan,
-            "p_value": float(np.median(p)) if len(p) else nan,
-            "effect_size": (better + worse) / len(p) if len(p) else nan,
-            "effect_size_name": "share of participants whose correlations differ",
-            "count_a": better,
-            "count_b": worse,
-            "reason": f"{concerned}: {min(reasons)}" if reasons else "",
-        }
+        for key, found in self._numbers.items():
+            numbers, reasons = np.array(found), self._reasons[key]
+            t, p = numbers[~np.isnan(numbers[:, 1])].T
+            better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
+            like = ", for instance" if len(reasons) > 1 else ""
+            concerned = f"in {len(numbers) - len(p)} of {len(numbers)} participants{like}"
+            yield Comparison(
+                *(*key, OM, RM),
+                n=len(p),
+                statistic=float(np.median(t)) if len(p) else nan,
+                p_value=float(np.median(p)) if len(p) else nan,
+                effect_size=(better + worse) / len(p) if len(p) else nan,
+                effect_size_name="share of participants whose correlations differ",
+                count_a=better,
+                count_b=worse,
+                reason=f"{concerned}: {min(reasons)}" if reasons else "",
+            )

@@ -61,7 +61,14 @@ def fit_measures(
         return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
-    magnitude, phase = _magnitude_and_phase(m, c)
+    size_m, size_c = float(np.linalg.norm(m)), float(np.linalg.norm(c))
+    # no magnitude and no phase error of a measured signal that is zero, no phase of a computed
+    magnitude, phase = nan if size_m == 0.0 else -1.0, nan
+    if size_m > 0.0 and size_c > 0.0:
+        u, v = m / size_m, c / size_c
+        # the arccos of Schwer's P, in the form that keeps its digits near 0 and pi (Kahan 2006)
+        angle = 2.0 * atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
+        magnitude, phase = size_c / size_m - 1.0, angle / pi
     schwer = magnitude, phase, hypot(magnitude, phase)
     n_effective = samples.effective_samples_of_pair(measured, computed, parts)
     return FitMeasures(rmse, percent, _pearson(m, c), *schwer, len(m), n_effective)
@@ -78,17 +85,6 @@ def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
     if len(m) < 2 or samples.is_constant(m) or samples.is_constant(c):
         return nan
     return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0))
-
-
-def _magnitude_and_phase(m: NDArray[np.float64], c: NDArray[np.float64]) -> tuple[float, float]:
-    """No magnitude and no phase error of a measured signal that is zero, no phase of a computed."""
-    size_m, size_c = float(np.linalg.norm(m)), float(np.linalg.norm(c))
-    if size_m == 0.0 or size_c == 0.0:
-        return nan if size_m == 0.0 else -1.0, nan
-    u, v = m / size_m, c / size_c
-    # the arccos of Schwer's P, in the form that keeps its digits near 0 and pi (Kahan 2006)
-    angle = 2.0 * atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
-    return size_c / size_m - 1.0, angle / pi
 
 
 # --- sway of the centre of pressure (Hansen 2017, table 3, with units and means corrected) --------

@@ -60,14 +60,8 @@ def cohens_d_pooled(mean_x: float, sd_x: float, mean_y: float, sd_y: float) -> f
 
 def described_pair(x: NDArray[np.float64], y: NDArray[np.float64]) -> TestResult:
     """Means and SDs of finite pairs."""
-    return TestResult(
-        n=len(x),
-        mean_a=mean_of(x),
-        sd_a=standard_deviation(x),
-        mean_b=mean_of(y),
-        sd_b=standard_deviation(y),
-        difference=mean_of(x - y),
-    )
+    known = TestResult(n=len(x), mean_a=mean_of(x), mean_b=mean_of(y), difference=mean_of(x - y))
+    return known.with_(sd_a=standard_deviation(x), sd_b=standard_deviation(y))
 
 
 def paired_t(x: ArrayLike, y: ArrayLike, confidence: float = 0.95) -> TestResult:
@@ -110,11 +104,7 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     nonzero = whole[whole != 0] * unit
     n, m = len(whole), len(nonzero)
     estimate = _hodges_lehmann(whole) * unit if n else nan
-    if m < MINIMUM_FOR_WILCOXON:
-        reason = (
-            f"Wilcoxon's test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-            f"there are {m}."
-        )
+    if reason := _too_few("Wilcoxon's", m):
         return TestResult(n=n, difference=estimate, reason=reason)
     ranks = stats.rankdata(np.abs(nonzero))
     has_ties = len(np.unique(ranks)) < m
@@ -122,13 +112,9 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     if m > (EXACT_WITH_TIES_UP_TO if has_ties else EXACT_WILCOXON_UP_TO):
         method = "asymptotic"
     positive, negative = float(ranks[nonzero > 0].sum()), float(ranks[nonzero < 0].sum())
-    return TestResult(
-        n=n,
-        difference=estimate,
-        statistic=min(positive, negative),
-        p_value=float(stats.wilcoxon(nonzero, method=method).pvalue),
-        effect_size=(positive - negative) / (positive + negative),
-    )
+    found = TestResult(n=n, difference=estimate, statistic=min(positive, negative))
+    p = float(stats.wilcoxon(nonzero, method=method).pvalue)
+    return found.with_(p_value=p, effect_size=(positive - negative) / (positive + negative))
 
 
 def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.05) -> TestResult:
@@ -162,12 +148,16 @@ def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
     own, other = int(np.sum(x < y)), int(np.sum(y < x))
     share = own / len(x) if len(x) else nan
     found = TestResult(n=len(x), effect_size=share, count_a=own, count_b=other)
-    if own + other >= MINIMUM_FOR_WILCOXON:
-        return found.with_(p_value=float(stats.binomtest(own, own + other).pvalue))
-    return found.with_(
-        reason=f"The sign test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-        f"there are {own + other}."
-    )
+    if reason := _too_few("The sign", own + other):
+        return found.with_(reason=reason)
+    return found.with_(p_value=float(stats.binomtest(own, own + other).pvalue))
+
+
+def _too_few(which: str, pairs: int) -> str:
+    if pairs >= MINIMUM_FOR_WILCOXON:
+        return ""
+    needs = f"{which} test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05"
+    return f"{needs}, there are {pairs}."
 
 
 def _why_no_t(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
@@ -193,10 +183,8 @@ def _without_rounding(
 
 
 def _hodges_lehmann(whole: NDArray[np.int64]) -> float:
-    """Median of the means of all pairs, each value with itself too.
-
-    The pairs are counted, not formed: those of a large cohort would fill the memory.
-    """
+    """Median of the means of all pairs, each value with itself too, which are counted, not formed:
+    those of a large cohort would fill the memory."""
     ordered, own = np.sort(whole), np.arange(len(whole))
 
     def pairs_up_to(total: int) -> int:
@@ -242,14 +230,9 @@ def one_way_anova(groups: Sequence[ArrayLike], alpha: float = 0.05) -> tuple[Tes
     ss_within = float(sum(np.sum((sample - sample.mean()) ** 2) for sample in samples))
     ss_total = float(np.sum((pooled - pooled.mean()) ** 2))
     df = float(len(pooled) - len(samples))
-    f, p = stats.f_oneway(*samples)
-    found = found.with_(
-        statistic=float(f),
-        df1=float(len(samples) - 1),
-        df2=df,
-        p_value=float(p),
-        effect_size=1.0 - ss_within / ss_total,
-    )
+    f, p = map(float, stats.f_oneway(*samples))
+    found = found.with_(statistic=f, df1=float(len(samples) - 1), df2=df, p_value=p)
+    found = found.with_(effect_size=1.0 - ss_within / ss_total)
     pairs, after = list(combinations(range(len(samples)), 2)), {}
     critical = float(stats.t.isf(alpha / 2.0 / len(pairs), df))
     for i, j in pairs:
@@ -297,14 +280,10 @@ def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[Tes
     pairs = list(combinations(range(k), 2))
     confidence = 1.0 - alpha / len(pairs)
     after = {(i, j): paired_t(table[:, i], table[:, j], confidence) for i, j in pairs}
-    return found.with_(
-        statistic=f,
-        df1=epsilon * df_effect,
-        df2=epsilon * df_error,
-        p_value=float(stats.f.sf(f, epsilon * df_effect, epsilon * df_error)),
-        effect_size=ss_effect / (ss_effect + ss_error),
-        epsilon=epsilon,
-    ), _bonferroni(after)
+    df1, df2 = epsilon * df_effect, epsilon * df_error
+    p, share = float(stats.f.sf(f, df1, df2)), ss_effect / (ss_effect + ss_error)
+    numbers = {"statistic": f, "df1": df1, "df2": df2, "p_value": p, "effect_size": share}
+    return found.with_(**numbers, epsilon=epsilon), _bonferroni(after)
 
 
 def _nothing_left(residual: NDArray[np.float64], values: NDArray[np.float64]) -> bool:

@@ -51,10 +51,7 @@ class TestResult:
         return replace(self, **numbers)
 
 
-# --- the normal distribution ----------------------------------------------------------------------
-
-
-Z95 = 1.959964  # standard deviations to either side that hold 95 %
+Z95 = 1.959964  # standard deviations to either side that hold 95 % of a normal distribution
 
 
 # --- p values of several tests, corrected for their number ----------------------------------------
@@ -97,7 +94,6 @@ def p_of_one_size(estimates: np.ndarray, widths: np.ndarray) -> float:
 
 # --- is a sample normal enough for a t test? ------------------------------------------------------
 
-
 MINIMUM_FOR_LILLIEFORS = 4  # the simulated table of critical values starts here
 
 
@@ -112,11 +108,12 @@ def lilliefors_test(x: ArrayLike) -> TestResult:
     """
     values = finite_values(x)
     n = len(values)
+    reason = ""
     if n < MINIMUM_FOR_LILLIEFORS:
         reason = f"Lilliefors' test needs {MINIMUM_FOR_LILLIEFORS} values, there are {n}."
-        return TestResult(n=n, reason=reason)
-    if is_constant(values):
+    elif is_constant(values):
         reason = "All values are equal, so there is no distribution to test."
+    if reason:
         return TestResult(n=n, reason=reason)
     from statsmodels.stats.diagnostic import lilliefors
 
@@ -169,7 +166,6 @@ def mean_of(values: NDArray[np.float64]) -> float:
 
 # --- contiguous intervals of a sampled signal: half-open index pairs (start, stop) into it --------
 
-
 Intervals = Sequence[tuple[int, int]]
 """(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
 
@@ -212,7 +208,6 @@ def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[n
 
 
 # --- how many independent samples an autocorrelated series is worth -------------------------------
-
 
 MINIMUM_SAMPLES = 4  # below this no autocorrelation can be estimated and the answer is nan
 WINDOW_PER_TIME = 5.0  # lags summed, in integrated correlation times (Sokal 1997, section 3)

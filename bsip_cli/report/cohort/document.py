@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -65,6 +66,7 @@ _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
 J Exp Soc Psychol 49, 764."""
 _FEWEST = 5  # persons among whom one can lie far out
+_GAIN = "Do identified parameters follow the forces better?"
 
 
 def cohort_document(record: CohortRecord) -> Document:
@@ -76,9 +78,7 @@ def cohort_document(record: CohortRecord) -> Document:
             Section("people", "Who took part?", (_people(record),)),
             diagnoses_section(record),
             laboratory.section(record),
-            Section(
-                "gain", "Do identified parameters follow the forces better?", tuple(_gain(record))
-            ),
+            Section("gain", _GAIN, tuple(_gain(record))),
             Section("tables", "The papers' tables", tuple(_tables(record))),
             Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
             WORDS,
@@ -95,13 +95,9 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     uses = [m.use for m in record.members if m.use]
     used = listing([f"{name} for {uses.count(name)}" for name in dict.fromkeys(uses)], "not known")
     software = ", ".join(sorted(record.made.versions.get("bsip", ())))
-    yield Terms(
-        (
-            ("Participants", f"{len(done)} of {everyone} have identified parameters"),
-            ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)"),
-            ("Software", f"bsip {software}"),
-        )
-    )
+    people = ("Participants", f"{len(done)} of {everyone} have identified parameters")
+    use = ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)")
+    yield Terms((people, use, ("Software", f"bsip {software}")))
     yield light_of_all(record)
     yield Heading("How large are the errors?")
     yield from _strips(record)
@@ -132,18 +128,12 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         far = is_far(values, one.good, one.limit)
         title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
         names = tuple(member.id for member in members)
-        drawn.append(
-            Strip(title, values, names, far, one.good, one.limit, errors.ENDS_AT * one.limit)
-        )
+        end = errors.ENDS_AT * one.limit
+        drawn.append(Strip(title, values, names, far, one.good, one.limit, end))
         rows[one.name] = list(values)
-        far_out += [
-            (
-                f"{member.id} ({one.in_sentence().replace(' (COP)', '')} {number(v)} {one.unit})",
-                member,
-            )
-            for member, v, is_out in zip(members, values, far, strict=True)
-            if is_out
-        ]
+        what = one.in_sentence().replace(" (COP)", "")
+        for member, v in compress(zip(members, values, strict=True), far):
+            far_out.append((f"{member.id} ({what} {number(v)} {one.unit})", member))
     if not any(np.isfinite(strip.values).any() for strip in drawn):
         yield Paragraph("No errors are known.", "warning")
         return
@@ -180,21 +170,12 @@ def _missing(record: CohortRecord) -> list[str]:
 
 
 def _people(record: CohortRecord) -> Grid:
-    head = (
-        "participant",
-        "calibrated on",
-        "sex",
-        "use",
-        "mass [kg]",
-        "plates against it [%]",
-        "height [m]",
-        *(f"{one.title} [{one.unit}]" for one in _yardsticks(record)),
-        "identified on [s]",
-        "condition number",
-        "refusals",
-    )
+    words = ("participant", "calibrated on", "sex", "use")
+    body = ("mass [kg]", "plates against it [%]", "height [m]")
+    known = (f"{one.title} [{one.unit}]" for one in _yardsticks(record))
+    head = (*words, *body, *known, "identified on [s]", "condition number", "refusals")
     rows = tuple(_person(record, member) for member in record.members)
-    return Grid(head, rows, words=4)
+    return Grid(head, rows, words=len(words))
 
 
 def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
@@ -246,25 +227,24 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
 
 def _table(table: Table) -> Iterator[Block]:
     """Means, the interval of their difference, and its p-value."""
-    headings = [column.heading for column in table.printed_columns()]
-    kept = [
-        k
-        for k, column in enumerate(table.printed_columns())
-        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
-    ]
     if not table.rows:
         yield Paragraph("There are no numbers for this table.", "note")
         return
-    words = sum(table.printed_columns()[k].text for k in kept)
+    columns = [
+        (k, column)
+        for k, column in enumerate(table.printed_columns())
+        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
+    ]
     rows: list[tuple[str | Cell, ...]] = []
     group = ""
     for row in table.rows:
         if row.group != group:
             group = row.group
-            rows.append((Cell(group, "group"), *[""] * (len(kept) - 1)))
+            rows.append((Cell(group, "group"), *[""] * (len(columns) - 1)))
         cells = table.printed_cells(row)
-        rows.append(tuple(cells[k] for k in kept))
-    yield Grid(tuple(headings[k] for k in kept), tuple(rows), words=max(1, words))
+        rows.append(tuple(cells[k] for k, _ in columns))
+    words = sum(column.text for _, column in columns)
+    yield Grid(tuple(one.heading for _, one in columns), tuple(rows), words=max(1, words))
     yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
 
 
@@ -279,11 +259,15 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         return
     if not ratios.held_out:
         yield Paragraph(TEXTS["nobody_held_out"], "warning")
-    worse = []
+    worse, rows = [], []
     for name in names:
         over = ratios.over_best_other(name)
-        fewer, more, _ = _counts(over)
-        worse += [component_label(name)] if _typical(over) > 0.0 or more > fewer else []
+        better = int((over < 1 - SAME_WITHIN).sum())
+        fewer, everyone = int((over > 1 + SAME_WITHIN).sum()), int(np.isfinite(over).sum())
+        worse += [component_label(name)] if _typical(over) > 0.0 or fewer > better else []
+        changes = (signed(100.0 * _typical(ratios.over_rm(name, m))) for m in (RM_MASS, OM))
+        counts = better, fewer, everyone - better - fewer, everyone
+        rows.append((component_label(name), *changes, *map(str, counts)))
     yield Paragraph(
         f"RM or RM+mass follows better on the whole, or in more participants, in: {listing(worse)}."
         if worse
@@ -299,14 +283,13 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
     yield picture("gain", figure, data.reset_index(), where=where)
     yield Grid(
         ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
-        tuple(_row(name, ratios) for name in names),
+        tuple(rows),
         f"Change of the error from RM. The same: within {percent(SAME_WITHIN)} %.",
         groups=(("", 1), ("typical change [%]", 2), ("number of participants", 4)),
     )
 
 
 def _one_number(ratios: Ratios) -> Iterator[Block]:
-    """What one number for the whole mass does without identification."""
     name = "grf_vertical"
     if name in ratios.of_component:
         rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
@@ -321,26 +304,7 @@ def _typical(ratios: np.ndarray) -> float:
     return float(np.exp(np.log(known).mean())) - 1.0 if len(known) else float("nan")
 
 
-def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
-    """In how many participants OM is better, in how many worse, and of how many."""
-    better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
-    return better, worse, int(np.isfinite(ratios).sum())
-
-
-def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
-    better, worse, everyone = _counts(ratios.over_best_other(component))
-    return (
-        component_label(component),
-        *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),
-        str(better),
-        str(worse),
-        str(everyone - better - worse),
-        str(everyone),
-    )
-
-
 # --- what is wrong in whose recordings, and what several people share -----------------------------
-
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
@@ -373,7 +337,11 @@ def light_of_all(record: CohortRecord) -> Light:
 def diagnoses_section(record: CohortRecord) -> Section:
     people = _searched_people(record)
     blocks: list[Block] = [] if people else [Paragraph(_NOT_RUN, "note")]
-    blocks += _unsearched(record)
+    missing = [m.id for m in record.members if m.facts is not None and m.searched is None]
+    if missing and people:
+        blocks.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
+    if without := [p.id for p in people if not p.was_searched]:
+        blocks.append(Paragraph(f"{_NO_TRIAL}: {named_people(without)}.", "note"))
     blocks += [Paragraph(text, "good") for text in _nothing_found(people)]
     reports = {m.id for m in record.members if m.has_report}
     rows = tuple(_cause_row(one.id, cause, reports) for one in people for cause in one.causes)
@@ -394,21 +362,7 @@ def _searched_people(record: CohortRecord) -> tuple[Searched, ...]:
     return tuple(m.searched for m in record.members if m.searched is not None)
 
 
-def _unsearched(record: CohortRecord) -> list[Block]:
-    """Those of whom nothing can be said."""
-    people = _searched_people(record)
-    missing = [m.id for m in record.members if m.facts is not None and m.searched is None]
-    said: list[Block] = []
-    if missing and people:
-        said.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
-    without = [p.id for p in people if not p.was_searched]
-    if without:
-        said.append(Paragraph(f"{_NO_TRIAL}: {named_people(without)}.", "note"))
-    return said
-
-
 def _nothing_found(people: Sequence[Searched]) -> list[str]:
-    """Those of the same movements together."""
     of_movements: dict[str, list[str]] = {}
     for one in people:
         if one.was_searched and not one.causes:

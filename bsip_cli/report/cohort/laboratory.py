@@ -41,18 +41,13 @@ def section(record: CohortRecord) -> Section:
     if table is not None:
         for number, rows in _of_several(table).groupby("laboratory"):
             name = f"laboratory_{number}"
-            cells = tuple(map(_row, _listed(rows)))
+            said = rows["verdict"].isin(SAID)  # and of each other fault the likeliest number
+            rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]
+            likeliest = rest.sort_values("probability", ascending=False).drop_duplicates("effect")
+            cells = tuple(map(_row, pd.concat([rows[said], likeliest]).to_dict("records")))
             caption = f"Laboratory {number}. {_TEXTS['caption']}"
             blocks.append(Grid(_HEAD, cells, caption, words=3, name=name, data=rows))
     return Section("laboratory", "The laboratory", tuple(blocks))
-
-
-def _listed(rows: pd.DataFrame) -> list[dict]:
-    """What is said, and of each other fault the likeliest number."""
-    said = rows["verdict"].isin(SAID)
-    rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]
-    likeliest = rest.sort_values("probability", ascending=False).drop_duplicates("effect")
-    return pd.concat([rows[said], likeliest]).to_dict("records")
 
 
 def named_sentences(table: pd.DataFrame) -> Iterator[str]:
@@ -71,7 +66,6 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
 
 
 def _named(row: Mapping[Any, Any]) -> str:
-    """A fault and, where there is a choice, its place."""
     title, place = effect_title(row["effect"]), place_label(row["effect"], row["target"])
     return f"{title} ({place})" if place else title
 
@@ -104,7 +98,6 @@ _SHOWN = {
 
 
 def _limits(rows: pd.DataFrame) -> Iterator[str]:
-    """The smallest limit of each fault that the sentence mentions."""
     for (effect, parameter), words in _SHOWN.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
         for best in mine.sort_values("limit").head(1).to_dict("records"):

@@ -134,7 +134,6 @@ class CohortRecord:
 
 # --- causes that several people's recordings share ------------------------------------------------
 
-
 SHARED = TEXTS["shared_causes"]
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
@@ -145,11 +144,8 @@ Cause = tuple[Candidate, ...]  # a single candidate, or all of a group of which 
 
 @dataclass(frozen=True)
 class Searched:
-    """What was found of one participant.
-
-    trials : stems of those that were searched.
-    was_searched : whether anything can be said at all.
-    """
+    """What was found of one participant; stems of the ``trials`` that were searched, and whether
+    anything can be said at all."""
 
     id: str
     causes: tuple[Cause, ...]
@@ -160,20 +156,24 @@ class Searched:
 def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]) -> Searched:
     """From a person's artifact ``diagnosis``, which is empty where no trial could be searched, and
     its facts."""
-    return Searched(
-        participant,
-        causes_of(candidates_of(diagnosis)),
-        tuple(facts.get("trials", ())),
-        not diagnosis.empty,
-    )
+    causes, trials = causes_of(candidates_of(diagnosis)), tuple(facts.get("trials", ()))
+    return Searched(participant, causes, trials, not diagnosis.empty)
 
 
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
     alike; what most people have comes first. The laboratory's faults are in its own part."""
-    shared = [found for found in _found(people) if len(found.people) > 1]
-    shared.sort(key=lambda found: -len(found.people))
-    said = [_in_words(found, people) for found in shared[:_MOST_SAID]]
+    found: dict[str, _Found] = {}
+    for person in people:
+        for cause in person.causes:
+            for one in (x for x in cause if not x.is_of_all):
+                known = found.setdefault(one.label, _Found(one.label, {}, set()))
+                known.people.setdefault(person.id, []).append(one)
+                if len(cause) == 1:
+                    known.named_of.add(person.id)
+    shared = [one for one in found.values() if len(one.people) > 1]
+    shared.sort(key=lambda one: -len(one.people))
+    said = [_in_words(one, people) for one in shared[:_MOST_SAID]]
     left = len(shared) - len(said)
     return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
 
@@ -187,22 +187,17 @@ class _Found:
     named_of: set[str]
 
 
-def _found(people: Sequence[Searched]) -> list[_Found]:
-    found: dict[str, _Found] = {}
-    for person in people:
-        for cause in person.causes:
-            for one in (x for x in cause if not x.is_of_all):
-                known = found.setdefault(one.label, _Found(one.label, {}, set()))
-                known.people.setdefault(person.id, []).append(one)
-                if len(cause) == 1:
-                    known.named_of.add(person.id)
-    return list(found.values())
-
-
 def _in_words(found: _Found, people: Sequence[Searched]) -> str:
     unsure = [person for person in found.people if person not in found.named_of]
     possibly = "possibly " if not found.named_of else ""
-    asked = _asked(found, people)
+    # how many could have shown it: a recording of the same task was searched; of quiet stance,
+    # which is no search, everybody counts
+    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
+    of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
+    asked = len(of_each)
+    if not tasks.isdisjoint(set().union(*of_each.values())):
+        could = (not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
+        asked = sum(could)
     where = f"{possibly}in {len(found.people)} of {asked} participants"
     if len(found.people) < asked:
         where += f" ({named_people(list(found.people))})"
@@ -214,18 +209,7 @@ def _in_words(found: _Found, people: Sequence[Searched]) -> str:
     return f"{text}; one of several that look alike in {which}."
 
 
-def _asked(found: _Found, people: Sequence[Searched]) -> int:
-    """How many could have shown it: a recording of the same task was searched. Of quiet stance, which is
-    no search, everybody counts."""
-    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
-    of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
-    if tasks.isdisjoint(set().union(*of_each.values())):
-        return len(of_each)
-    return sum(not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
-
-
 def _sizes(numbers: Sequence[Number | None]) -> str:
-    """From the least to the largest, and whether they are equal within their intervals."""
     known = [n for n in numbers if n is not None]
     if len(known) < len(numbers) or len({n.name for n in known}) > 1:
         return ""

@@ -29,14 +29,8 @@ MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay
 _MM = 1.0 / 25.4
 _DPI_OF_SVG = 72.0
 _FONTS = b"'DejaVu Sans', Verdana, Arial, sans-serif"  # of much the same width
-_RC: dict[Any, Any] = {
-    "svg.hashsalt": "bsip",
-    "svg.fonttype": "none",
-    "font.family": "DejaVu Sans",
-    "font.size": 8,
-    "axes.unicode_minus": True,
-    "path.simplify": True,
-}
+_RC: dict[Any, Any] = {"svg.hashsalt": "bsip", "svg.fonttype": "none", "path.simplify": True}
+_RC |= {"font.family": "DejaVu Sans", "font.size": 8, "axes.unicode_minus": True}
 
 
 @dataclass(frozen=True)
@@ -93,17 +87,9 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     """A legend in one row over the axes, where no curve runs; each label once."""
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
-    axes.legend(
-        once.values(),
-        once.keys(),
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        fontsize=8,
-        borderaxespad=0.2,
-        handlelength=2.4,
-    )
+    where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    where |= {"frameon": False, "fontsize": 8, "borderaxespad": 0.2, "handlelength": 2.4}
+    axes.legend(once.values(), once.keys(), ncols=columns, **where)
 
 
 def plain(text: str, longest: int = LONGEST_LABEL) -> str:
@@ -135,15 +121,10 @@ def to_svg(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
-        _lay_out(figure)
+        FigureCanvasSVG(figure)
+        if engine := figure.get_layout_engine():  # once; else saving would draw all twice
+            figure.set_dpi(_DPI_OF_SVG)
+            engine.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=200)
     return buffer.getvalue().replace(b"'DejaVu Sans'", _FONTS)
-
-
-def _lay_out(figure: Figure) -> None:
-    """Once; with a layout engine of its own, saving would draw all twice."""
-    FigureCanvasSVG(figure)
-    if engine := figure.get_layout_engine():
-        figure.set_dpi(_DPI_OF_SVG)
-        engine.execute(figure)
-        figure.set_layout_engine(None)

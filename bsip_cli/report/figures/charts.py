@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
-from matplotlib.ticker import FixedLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
 from bsip_cli.report.blocks import Bar
 from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills
@@ -46,15 +46,9 @@ def error_bars(bars: Sequence[Bar], first: Sequence[Piece] = ()) -> Figure:
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
     canvas.tidy(axes, grid="x")
-    figure.legend(
-        list(handles.values()),
-        list(handles),
-        loc="outside upper center",
-        ncols=2,
-        frameon=False,
-        fontsize=7.5,
-        handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
-    )
+    how: dict[str, Any] = {"handler_map": {tuple: HandlerTuple(ndivide=None, pad=0.0)}}
+    how |= {"loc": "outside upper center", "ncols": 2, "frameon": False, "fontsize": 7.5}
+    figure.legend(list(handles.values()), list(handles), **how)
     return figure
 
 
@@ -80,9 +74,8 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
     """A bar per marker; the line is the limit."""
     figure = canvas.new_figure(52)
     axes = figure.add_subplot()
-    axes.bar(
-        range(len(markers)), rms_mm, color=np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
-    )
+    colours = np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
+    axes.bar(range(len(markers)), rms_mm, color=colours)
     axes.axhline(limit_mm, color=canvas.INK, lw=0.9, ls="--")
     axes.set_xticks(range(len(markers)), [canvas.plain(name) for name in markers], rotation=90)
     axes.set_xlim(-0.6, len(markers) - 0.4)
@@ -93,10 +86,8 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
 
 
 def _ticks(axes: Axes, low: float, high: float) -> None:
-    """Of a logarithmic axis."""
     axes.set_xlim(low, high)
     ticks = [t for t in _TICKS if low <= t <= high]
-    axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
 
@@ -121,14 +112,8 @@ def segment_masses(data: pd.DataFrame) -> Figure:
     canvas.legend_above(masses)
     differences.axvline(0.0, color=canvas.ORANGE, lw=1.2, ls="--")
     spread = np.nan_to_num(Z95 * data["om_sd_kg"])
-    dots: dict[str, Any] = {
-        "fmt": "o",
-        "ms": 4,
-        "color": canvas.BLUE,
-        "ecolor": canvas.SOFT,
-        "elinewidth": 1.1,
-        "capsize": 2,
-    }
+    dots: dict[str, Any] = {"fmt": "o", "ms": 4, "color": canvas.BLUE}
+    dots |= {"ecolor": canvas.SOFT, "elinewidth": 1.1, "capsize": 2}
     differences.errorbar(data["om_kg"] - data["rm_kg"], rows, xerr=spread, **dots)
     differences.set_xlabel("OM − RM [kg], 95 % interval")
     shares.barh(rows, 100.0, height=0.55, color=canvas.FAINT)
@@ -143,7 +128,6 @@ def segment_masses(data: pd.DataFrame) -> Figure:
 
 
 # --- a dot per person: errors and their yardsticks, and what identification gains -----------------
-
 
 _SPREAD = 0.28
 
@@ -179,16 +163,11 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
     axes.axhline(strip.limit, color="#b30000", lw=1.2)
     colours = np.where(strip.far[known], canvas.ORANGE, canvas.BLUE)
     many = len(known) > canvas.MANY_PEOPLE
+    style: dict[str, Any] = {"s": 8 if many else 22, "rasterized": many}
     beyond = strip.values[known] > strip.end
     for marker, mine, most in (("o", ~beyond, strip.end), ("^", beyond, 0.98 * strip.end)):
-        axes.scatter(
-            offsets[mine],
-            np.minimum(strip.values[known][mine], most),
-            s=8 if many else 22,
-            c=colours[mine],
-            marker=marker,
-            rasterized=many,
-        )
+        values = np.minimum(strip.values[known][mine], most)
+        axes.scatter(offsets[mine], values, c=colours[mine], marker=marker, **style)
     for x, k in zip(offsets, known, strict=True):
         if strip.far[k]:
             value, name = float(strip.values[k]), canvas.plain(strip.names[k])
@@ -235,18 +214,9 @@ def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
     line, people = canvas.line_of(method), len(ratios)
     many = people > canvas.MANY_PEOPLE
     offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
-    axes.scatter(
-        ratios,
-        row + offsets,
-        s=6 if many else 24,
-        lw=0.0 if many else 0.5,
-        rasterized=many,
-        edgecolor="white",
-        marker=line.marker,
-        color=line.colour,
-        label=method,
-        zorder=2,
-    )
+    style: dict[str, Any] = {"marker": line.marker, "color": line.colour, "edgecolor": "white"}
+    style |= {"s": 6, "lw": 0.0} if many else {"s": 24, "lw": 0.5}
+    axes.scatter(ratios, row + offsets, rasterized=many, label=method, zorder=2, **style)
     if np.isfinite(ratios).any():
         mean = float(np.exp(np.nanmean(np.log(ratios))))
         axes.plot([mean, mean], [row - 0.38, row + 0.38], color=line.colour, lw=1.8, zorder=3)

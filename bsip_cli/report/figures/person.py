@@ -30,7 +30,11 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     figure = canvas.new_figure(_HIGH_MM, _WIDE_MM)
     axes = figure.subplots()
     centre = pose.bones_m[0, 0]
-    ground = projected(_tiles(pose.ground_m, centre), centre)
+    steps = _TILE_M * np.arange(-1, 2)
+    ends = np.array([steps[0], steps[-1]])
+    floor = [[(x, y, 0.0) for y in ends] for x in steps]
+    floor += [[(x, y, 0.0) for x in ends] for y in steps]
+    ground = projected(np.array(floor) + np.array([*centre[:2], pose.ground_m]), centre)
     axes.add_collection(LineCollection(list(ground), colors=canvas.FAINT, linewidths=0.6))
     bones = projected(pose.bones_m, centre)
     colours, widths = zip(*(_LIMBS[side] for side in pose.sides), strict=True)
@@ -67,15 +71,6 @@ def projected(points_m: np.ndarray, centre_m: np.ndarray) -> np.ndarray:
     across = -np.sin(_YAW) * x + np.cos(_YAW) * y
     away = np.cos(_YAW) * x + np.sin(_YAW) * y
     return np.stack([across, np.cos(_PITCH) * z + np.sin(_PITCH) * away], axis=-1)
-
-
-def _tiles(ground_m: float, centre_m: np.ndarray) -> np.ndarray:
-    """(n, 2, 3) lines of a floor under the person."""
-    steps = _TILE_M * np.arange(-1, 2)
-    ends = np.array([steps[0], steps[-1]])
-    along = [[(x, y, 0.0) for y in ends] for x in steps]
-    across = [[(x, y, 0.0) for x in ends] for y in steps]
-    return np.array(along + across) + np.array([centre_m[0], centre_m[1], ground_m])
 
 
 # --- poses ----------------------------------------------------------------------------------------
@@ -153,20 +148,11 @@ def poses_of(
     times = rows["time_s"].to_numpy()
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
     force, point = _forces(reconstruction, times, axes, ground)
+    ends = np.stack([start, end], axis=2)
+    each = zip(times.tolist(), ends, heads, markers, point, force, strict=True)
     return tuple(
-        Pose(
-            float(times[k]),
-            np.stack([start[k], end[k]], axis=1),
-            sides,
-            heads[k],
-            _HEAD_RADIUS_M,
-            markers[k],
-            point[k],
-            force[k],
-            ground,
-            body_weight_N,
-        )
-        for k in range(len(times))
+        Pose(time_s, two, sides, centre, _HEAD_RADIUS_M, seen, at, measured, ground, body_weight_N)
+        for time_s, two, centre, seen, at, measured in each
     )
 
 

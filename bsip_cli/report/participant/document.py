@@ -50,6 +50,7 @@ from bsip_cli.statistics.methods import OM, RM, RM_MASS
 def participant_document(record: records.ParticipantRecord) -> Document:
     made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
+    parameters = (*_choice(record), *_masses(record), *_next(record))
     return Document(
         title=f"{record.id}: do force plates and markers agree?",
         subtitle="",
@@ -58,7 +59,7 @@ def participant_document(record: records.ParticipantRecord) -> Document:
             diagnosis_section(record),
             errors.section(record),
             errors.joints_section(record),
-            parameters_section(record),
+            Section("parameters", "Which segment parameters come out?", parameters),
             recording_section(record),
             Section("made", "How was it made, and what can it not know?", tuple(made)),
             WORDS,
@@ -67,7 +68,6 @@ def participant_document(record: records.ParticipantRecord) -> Document:
 
 
 # --- what was recorded: trials, what was repaired or left out, markers ----------------------------
-
 
 _MOST_FINDINGS = 10
 _MOST_EVENTS = 6
@@ -85,41 +85,25 @@ def recording_section(record: records.ParticipantRecord) -> Section:
 
 
 def _trials(record: records.ParticipantRecord) -> Grid:
-    uses = uses_of(record)
-    head = (
-        "recording",
-        "role",
-        "use",
-        "duration [s]",
-        "forces compared [%]",
-        "pose known [%]",
-        "markers [mm]",
-    )
-    rows = tuple(_trial_row(trial, uses[trial.stem].in_words()) for trial in record.trials)
-    return Grid(head, rows, TEXTS["captions"]["trials"], words=3)
-
-
-def _trial_row(trial: records.TrialRecord, use: str) -> tuple[str | Cell, ...]:
-    role = ROLES[trial.role]
-    frame = trial.kinematics
-    if frame is None or frame.empty:
-        return (trial.label, role, use, MISSING, MISSING, MISSING, MISSING)
-    compared = np.nan
-    if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
-        compared = float(records.flags_of(trial.reconstruction, "valid").mean())
-    return (
-        trial.label,
-        role,
-        use,
-        number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
-        percent(compared),
-        percent(float(frame["determined"].astype(float).mean())),
-        number(trial.markers_mm()),
-    )
+    uses, rows = uses_of(record), []
+    for trial in record.trials:
+        frame, numbers = trial.kinematics, (MISSING,) * 4
+        if frame is not None and not frame.empty:
+            compared = np.nan
+            if trial.reconstruction is not None and len(records.clock_of(trial.reconstruction)):
+                compared = float(records.flags_of(trial.reconstruction, "valid").mean())
+            numbers = (
+                number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
+                percent(compared),
+                percent(float(frame["determined"].astype(float).mean())),
+                number(trial.markers_mm()),
+            )
+        rows.append((trial.label, ROLES[trial.role], uses[trial.stem].in_words(), *numbers))
+    head = ("recording", "role", "use", "duration [s]", "forces compared [%]", "pose known [%]")
+    return Grid((*head, "markers [mm]"), tuple(rows), TEXTS["captions"]["trials"], words=3)
 
 
 def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
-    """What the person carried as the study says, and what was made of it."""
     trials_of: dict[str, list[str]] = {}
     for trial, words in record.loads:
         trials_of.setdefault(words, []).append(trial)
@@ -131,13 +115,12 @@ def _loads(record: records.ParticipantRecord) -> Iterator[Block]:
 def _findings(record: records.ParticipantRecord) -> Iterator[Block]:
     """What ingest repaired, warned of or left out: one line per check, with its recordings."""
     found: dict[tuple[str, str, str], dict[str, set[str]]] = {}
-    for trial in record.trials:
-        if trial.quality is not None:
-            for row in trial.quality.to_dict("records"):
-                if row["level"] in _LEVELS:
-                    key = (row["level"], row["check"], row["action"])
-                    what = f"{row['subject']} {row['found']}".strip()
-                    found.setdefault(key, {}).setdefault(trial.label, set()).add(what)
+    known = ((trial.label, t) for trial in record.trials if (t := trial.quality) is not None)
+    for label, table in known:
+        for row in table[table["level"].isin(_LEVELS)].to_dict("records"):
+            key = (row["level"], row["check"], row["action"])
+            what = f"{row['subject']} {row['found']}".strip()
+            found.setdefault(key, {}).setdefault(label, set()).add(what)
     lines = []
     for level, check, action in sorted(found, key=lambda key: _LEVELS.index(key[0])):
         trials = found[level, check, action]
@@ -188,30 +171,20 @@ def _events(record: records.ParticipantRecord) -> Iterator[Block]:
 
 # --- which segment parameters come out, how sure they are, and in which movements to use them -----
 
-
 _FROM_TABLE = 0.2  # less of the variance than this removed: the number is the table's
 _COM = ["com_x_m", "com_y_m", "com_z_m"]
 _RATIOS = ("om", "rm_mass", "om_rm_mass")
 _MOST_STEPS = 3
 
 
-def parameters_section(record: records.ParticipantRecord) -> Section:
-    blocks = (*_choice(record), *_masses(record), *_next(record))
-    return Section("parameters", "Which segment parameters come out?", blocks)
-
-
 def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
-    """Nothing where ``choose`` has not run."""
     choice = record.choice
     if choice is None or choice.empty:
         return
     yield Paragraph(str(choice["sentence"].iloc[0]))
     for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
-        yield Paragraph(
-            f"Do not use {row.method}: a body like this is rarer than 1 in 100 people, most by "
-            f"{row.farthest}.",
-            "warning",
-        )
+        why = f"a body like this is rarer than 1 in 100 people, most by {row.farthest}"
+        yield Paragraph(f"Do not use {row.method}: {why}.", "warning")
     if choice["trials"].iloc[0]:
         head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
         rows = tuple(
@@ -234,22 +207,14 @@ def _ratio(row: Mapping, name: str) -> str:
 def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     rm, om = record.method(RM), record.method(OM)
     if om.empty or rm.empty:
-        gone = OM if om.empty else RM
-        yield Paragraph(
-            f"There are no parameters of {gone}, so nothing can be compared.", "warning"
-        )
+        missing = f"There are no parameters of {OM if om.empty else RM}"
+        yield Paragraph(f"{missing}, so nothing can be compared.", "warning")
         return
     om = om.reindex(rm.index)
-    shown = pd.DataFrame(
-        {
-            "rm_kg": rm["mass_kg"],
-            "rm_mass_kg": record.method(RM_MASS)["mass_kg"].reindex(rm.index),
-            "om_kg": om["mass_kg"],
-            "om_sd_kg": om["mass_kg_sd"],
-            "data_share": om["mass_data_share"],
-        },
-        dtype=float,
-    )
+    scaled = record.method(RM_MASS)["mass_kg"].reindex(rm.index)
+    masses = {"rm_kg": rm["mass_kg"], "rm_mass_kg": scaled, "om_kg": om["mass_kg"]}
+    masses |= {"om_sd_kg": om["mass_kg_sd"], "data_share": om["mass_data_share"]}
+    shown = pd.DataFrame(masses, dtype=float)
     labelled = shown.rename(index=segment_label)
     numbers = shown.rename_axis("segment").reset_index()
     yield picture("masses", segment_masses(labelled), numbers)
@@ -268,15 +233,9 @@ def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
     table, own = shown["rm_kg"], shown["om_kg"]
     total = ("whole body", number(table.sum(), 2), number(own.sum(), 2))
     change = signed(100.0 * (own.sum() / table.sum() - 1.0))
+    head = ("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "centre of mass moves [mm]")
     yield Grid(
-        (
-            "segment",
-            "RM [kg]",
-            "OM [kg] ± sd",
-            "change [%]",
-            "centre of mass moves [mm]",
-            "data decide [%]",
-        ),
+        (*head, "data decide [%]"),
         (*rows, (*total, change, "", "")),
         "Centres of mass and tensors of inertia with their errors are in the CSV.",
         name="segment_parameters",
@@ -285,7 +244,6 @@ def _masses(record: records.ParticipantRecord) -> Iterator[Block]:
 
 
 def _next(record: records.ParticipantRecord) -> Iterator[Block]:
-    """What to record to know more."""
     table = record.excitation
     if table.empty:
         yield Paragraph("How well the movement excites the parameters was not computed.", "note")
@@ -294,20 +252,15 @@ def _next(record: records.ParticipantRecord) -> Iterator[Block]:
     silent = [segment_label(n) for n in combinations.loc[combinations["value"] == 0, "name"]]
     if silent:
         yield Paragraph(f"These recordings add nothing to the table for {listing(silent)}.")
-    steps = table[table["quantity"] == "next"].head(_MOST_STEPS)
-    if len(steps):
-        yield Heading("What to record next time")
-        yield Numbered(
-            tuple(
-                f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
-                f"data, most of all for the {segment_label(row['segment'])}."
-                for row in steps.to_dict("records")
-            )
-        )
+    steps = [
+        f"{capital(row['text'])}: {number(row['value'])} percentage points more decided by the "
+        f"data, most of all for the {segment_label(row['segment'])}."
+        for row in table[table["quantity"] == "next"].head(_MOST_STEPS).to_dict("records")
+    ]
+    yield from [Heading("What to record next time"), Numbered(tuple(steps))] if steps else []
 
 
 # --- what is wrong, and how sure that is: causes, size and effect, what could not be seen ----------
-
 
 _NEAREST = 4  # rejected causes that are listed
 _BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
@@ -343,17 +296,12 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
     rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
-    rows = tuple(
-        (
-            one.label,
-            verdict.probability_words(one.probability) or MISSING,
-            number(one.rms_change, 1),
-            one.removes(),
-        )
-        for one in rejected
-    )
+    rows = []
+    for one in rejected:
+        sure = verdict.probability_words(one.probability) or MISSING
+        rows.append((one.label, sure, number(one.rms_change, 1), one.removes()))
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
-    return (Grid(head, rows, TEXTS["captions"]["nearest"]),)
+    return (Grid(head, tuple(rows), TEXTS["captions"]["nearest"]),)
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -388,12 +336,12 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
         if len(hidden) == len(sizes):
             never.append(effect_words.effect_title(effect))
         elif hidden and effect in _BY_PART:
-            places = (
-                (effect_words.place_label(effect, at), effect_words.parameter_label(effect, one))
-                for at, one in hidden
-            )
-            words = "; ".join(", ".join(filter(None, part)) for part in places)
-            never.append(f"{effect_words.effect_title(effect)} ({words})")
+            words = []
+            for at, one in hidden:
+                place = effect_words.place_label(effect, at)
+                of_it = effect_words.parameter_label(effect, one)
+                words.append(", ".join(filter(None, (place, of_it))))
+            never.append(f"{effect_words.effect_title(effect)} ({'; '.join(words)})")
     if not never:
         return []
     return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]
@@ -402,7 +350,6 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
 def _limit_rows(
     effect: str, together: Sequence[Limit], alone: Sequence[Limit]
 ) -> Iterator[tuple[str, ...]]:
-    """A row per unit: the range over all places and directions."""
     lasting = [x for x in together if x.effect == effect and x.trials > 1]
     single = [x for x in alone if x.effect == effect]
     usual = effect_words.USUAL[effect]

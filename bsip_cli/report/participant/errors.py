@@ -3,7 +3,7 @@ makes them; and what identification and named faults change at the joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -46,49 +46,40 @@ def section(record: ParticipantRecord) -> Section:
 
 
 def _over_time(record: ParticipantRecord) -> Iterator[Block]:
-    trial, window = _most_compared(record)
-    if trial is None:
+    """Of the trial with most compared frames that OM did not see, if any, up to ten seconds of its
+    longest interval."""
+    own = {trial.stem for trial in record.identification_trials()}
+    tables = [(one, t) for one in record.moving_trials() if (t := one.reconstruction) is not None]
+    counts = [int(flags_of(table, "valid").sum()) for _, table in tables]
+    found = [
+        (one.stem not in own, count, one, table)
+        for count, (one, table) in zip(counts, tables, strict=True)
+        if count > 1
+    ]
+    if not found:
         yield Paragraph("No recording has forces that could be compared.", "warning")
         return
-    assert trial.reconstruction is not None
-    clock = clock_of(trial.reconstruction)[window]
+    *_, trial, table = max(found, key=lambda one: one[:2])
+    valid = flags_of(table, "valid")
+    window = middle_of_longest(clock_of(table), valid, _WINDOW_S)
+    clock = clock_of(table)[window]
     data, panels = {"time_s": clock}, []
     for column, title, scale in _PANELS:
-        signals = signals_of(trial.reconstruction, column)
-        valid = flags_of(trial.reconstruction, "valid")
+        signals = signals_of(table, column)
         shown = {m: scale * np.where(valid, v, np.nan)[window] for m, v in signals.items()}
         panels.append(Panel(title, clock, shown))
         data |= {f"{column}_{m}": v / scale for m, v in shown.items()}
-    seen = flags_of(trial.reconstruction, "used")[window].any()
+    seen = flags_of(table, "used")[window].any()
     fitted = "used to identify, which favours OM" if seen else "not used to identify"
     words = {"start": f"{clock[0]:.1f}", "end": f"{clock[-1]:.1f}", "fitted": fitted}
     numbers = pd.DataFrame(data)
     yield picture("forces", curves(panels, 1), numbers, trial=trial.label, **words)
 
 
-def _most_compared(record: ParticipantRecord) -> tuple[TrialRecord | None, slice]:
-    """The trial with most compared frames that OM did not see, if any, and up to ten seconds of its
-    longest interval."""
-    own = {trial.stem for trial in record.identification_trials()}
-    found = [
-        (trial.stem not in own, int(flags_of(trial.reconstruction, "valid").sum()), trial)
-        for trial in record.moving_trials()
-        if trial.reconstruction is not None and len(trial.reconstruction)
-    ]
-    found = [one for one in found if one[1] > 1]
-    if not found:
-        return None, slice(0)
-    *_, trial = max(found, key=lambda one: one[:2])
-    assert trial.reconstruction is not None
-    clock, valid = clock_of(trial.reconstruction), flags_of(trial.reconstruction, "valid")
-    return trial, middle_of_longest(clock, valid, _WINDOW_S)
-
-
 # --- what makes them ----------------------------------------------------------------------------
 
 
 def _budget(record: ParticipantRecord) -> Iterator[Block]:
-    """Component by component, all recordings together."""
     if record.budget is None or record.budget.empty:
         return
     found = effects_in(record.causes)
@@ -96,9 +87,8 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
     for component in COMPONENTS:
         size, unit = budget_words.size_of(record.budget, component)
         if size >= budget_words.LEAST_REPORTED_SIZE:
-            parts = budget_words.pieces(record.budget, component, found)
             name = f"{component_label(component)}, {number(size, 1)} {unit}"
-            bars.append(Bar(name, parts))
+            bars.append(Bar(name, budget_words.pieces(record.budget, component, found)))
     if bars:
         figure = error_bars(bars, budget_words.overall_pieces(record.budget, found))
         yield picture("error_budget", figure, record.budget[record.budget["trial"] == ""])
@@ -139,7 +129,6 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def _cell(gain: errors.Gain | None, method: str) -> Cell:
-    """The error, marked where it is smaller than those of all others."""
     if gain is None:
         return Cell(number(None))
     own = gain.of.get(method, np.nan)
@@ -148,25 +137,17 @@ def _cell(gain: errors.Gain | None, method: str) -> Cell:
 
 
 def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator[Block]:
-    """What one number for the whole mass is, and does without identification."""
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
-    found = [
-        m
-        for m in errors.pooled_gains(held_out)
-        if m.component == "grf_vertical" and RM_MASS in m.of
-    ]
-    if len(rows) and found:
-        (mean,) = found
+    mean = {one.component: one for one in errors.pooled_gains(held_out)}.get("grf_vertical")
+    if len(rows) and mean is not None and RM_MASS in mean.of:
         over = errors.relative_change(mean.of[RM_MASS], mean.of[OM])
-        said = errors.one_number_alone(
-            component_label(mean.component), mean.change(RM_MASS), mean.change(), over
-        )
+        changes = mean.change(RM_MASS), mean.change(), over
+        said = errors.one_number_alone(component_label(mean.component), *changes)
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")
 
 
 # --- what identification and named faults change at the joints: curves and peaks of the moments ---
-
 
 _LEGS = ("hip", "knee", "ankle")
 _ARMS = ("shoulder", "elbow")
@@ -250,29 +231,29 @@ def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
     mine = rows[(rows["joint"] == joint) & (rows["axis"] == axis)]
     of = {method: mine[mine["method"] == method] for method in methods}
     time = of[methods[0]]["time_s"].to_numpy()
-    return Panel(
-        f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]",
-        time,
-        {
-            EXTENDED if is_extended(method) else method: own["moment_Nm"].to_numpy()
-            for method, own in of.items()
-        },
-        {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM},
-    )
+    named = {
+        EXTENDED if is_extended(m) else m: own["moment_Nm"].to_numpy() for m, own in of.items()
+    }
+    spreads = {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM}
+    return Panel(f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]", time, named, spreads)
 
 
 # --- peaks --------------------------------------------------------------------------------------
 
 
 def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
-    """Of all recordings, with a column ``trial``."""
-    tables = [t.joint_peaks.assign(trial=t.stem) for t in trials if t.joint_peaks is not None]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+    return peaks_of((t.stem, t.joint_peaks) for t in trials if t.joint_peaks is not None)
 
 
-def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)) -> Iterator[str]:
+def peaks_of(tables: Iterable[tuple[str, pd.DataFrame]]) -> pd.DataFrame:
+    """Of all recordings (stem, ``joint-peaks``), with a column ``trial``."""
+    every = [table.assign(trial=stem) for stem, table in tables]
+    return pd.concat(every, ignore_index=True) if every else pd.DataFrame()
+
+
+def largest_changes(peaks: pd.DataFrame) -> Iterator[str]:
     """What identification, and each named fault, changes most: a sentence each."""
-    for method, rows in _changed(peaks, kinds).groupby("method", sort=False):
+    for method, rows in _changed(peaks).groupby("method", sort=False):
         if method == OM or is_extended(str(method)):
             most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
             what = "Identification (OM against RM)"
@@ -294,7 +275,7 @@ def moment_change(
     alike = [c for other in causes for c in other if c.effect == one.effect]
     if len(cause) > 1 or any(c != one and {*c.trials} & {*one.trials} for c in alike):
         return ""
-    known = _changed(peaks, (*_LEGS, *_ARMS))
+    known = _changed(peaks)
     is_of_it = known["method"].str.endswith(f"+{one.effect}")
     rows = known[is_of_it & known["trial"].isin(one.trials)]
     if rows.empty:
@@ -309,11 +290,11 @@ def moment_change(
     )
 
 
-def _changed(peaks: pd.DataFrame, kinds: Sequence[str]) -> pd.DataFrame:
-    """Rows of known changes at joints of these kinds."""
+def _changed(peaks: pd.DataFrame) -> pd.DataFrame:
+    """Rows of known changes at joints of legs and arms."""
     if peaks.empty:
         return pd.DataFrame(columns=["method", "trial"], dtype=str)
-    asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
+    asked = peaks["joint"].str.rpartition("_")[0].isin((*_LEGS, *_ARMS))
     return peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
 
 
@@ -321,7 +302,21 @@ def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[Tria
     peaks = trial.joint_peaks
     assert peaks is not None
     faults = [name for name in dict.fromkeys(peaks["method"]) if is_extended(name)]
-    rows = [_peak_row(peaks, joint, faults) for joint in joints]
+    rows = []
+    for joint in joints:
+        axis = _axis(peaks, joint)
+        of_axis = peaks[(peaks["joint"] == joint) & (peaks["axis"] == axis)].to_dict("records")
+        mine = {row["method"]: row for row in of_axis}
+        own = mine.get(OM) or mine[RM]
+        changes = (mine[name] for name in (OM, *faults) if name in mine)
+        cells = (
+            f"{in_words(joint)} {axis.replace('_', ' ')}",
+            f"{number(own['peak_Nm'], 1)} ± {number(Z95 * own['peak_sd_Nm'], 1)}",
+            number(own["peak_Nm_kg"], 2),
+            number(own["peak_at_s"], 2),
+            *(f"{signed(c['change_Nm'], 1)} ({number(c['change_percent'], 0)})" for c in changes),
+        )
+        rows.append(cells)
     names = [f"{effect_title(name.rpartition('+')[2])} [N m (%)]" for name in faults]
     return Grid(
         ("joint", "peak, OM [N m]", "[N m/kg]", "at [s]", "OM − RM [N m (%)]", *names),
@@ -330,21 +325,6 @@ def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[Tria
         "of the joint's peak. A change beyond the interval matters.",
         name="joint_peaks",
         data=all_peaks(trials),
-    )
-
-
-def _peak_row(peaks: pd.DataFrame, joint: str, faults: Sequence[str]) -> tuple[str, ...]:
-    axis = _axis(peaks, joint)
-    rows = peaks[(peaks["joint"] == joint) & (peaks["axis"] == axis)].to_dict("records")
-    mine = {row["method"]: row for row in rows}
-    own = mine.get(OM) or mine[RM]
-    changes = (mine[name] for name in (OM, *faults) if name in mine)
-    return (
-        f"{in_words(joint)} {axis.replace('_', ' ')}",
-        f"{number(own['peak_Nm'], 1)} ± {number(Z95 * own['peak_sd_Nm'], 1)}",
-        number(own["peak_Nm_kg"], 2),
-        number(own["peak_at_s"], 2),
-        *(f"{signed(c['change_Nm'], 1)} ({number(c['change_percent'], 0)})" for c in changes),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from itertools import product
 from pathlib import Path
 
 import pandas as pd
@@ -19,10 +19,7 @@ from bsip_cli.report.tables.model import (
     Table,
     column,
     count,
-    counts_of,
     mean_sd,
-    number,
-    p_value,
     unit_label,
 )
 from bsip_cli.report.tables.paired import REASON, SHORT
@@ -39,33 +36,15 @@ _MARKS = {
 """Where the sign of a post hoc difference stands, and which it is, after the print."""
 
 _ALL = " / ".join((MEASURED, OM, RM)), ""
-_anova = partial(column, pair=_ALL)
-_ANOVA = (
-    _anova("f", "one_way_anova.statistic", "F", number(2)),
-    _anova("df1", "one_way_anova.df1"),
-    _anova("df2", "one_way_anova.df2"),
-    _anova("p", "one_way_anova.p_value", "p", p_value),
-    _anova("eta_squared", "one_way_anova.effect_size"),
-    _anova("lilliefors_p_smallest", "one_way_anova.lilliefors_p"),
-    _anova("repeated_f", "repeated_measures_anova.statistic", "F repeated", number(2)),
-    _anova("repeated_df1", "repeated_measures_anova.df1"),
-    _anova("repeated_df2", "repeated_measures_anova.df2"),
-    _anova("repeated_p", "repeated_measures_anova.p_value", "p repeated", p_value),
-    _anova("repeated_epsilon", "repeated_measures_anova.epsilon", "epsilon", number(2)),
-    _anova("repeated_partial_eta_squared", "repeated_measures_anova.effect_size"),
-)
 
 
 def _posturography(results: Results, criteria: Criteria) -> Table:
     alpha, short = criteria.alpha, {MEASURED: "fp"} | SHORT
     measured = "bonferroni_t.mean_a bonferroni_t.sd_a"
+    tests_after = {"bonferroni_p": "bonferroni_t", "repeated_bonferroni_p": "bonferroni_paired_t"}
     post_hoc = [
         column(f"{kind}_{short[a]}_{short[b]}", f"{test}.p_value", pair=(a, b))
-        for kind, test in (
-            ("bonferroni_p", "bonferroni_t"),
-            ("repeated_bonferroni_p", "bonferroni_paired_t"),
-        )
-        for a, b in _MARKS
+        for (kind, test), (a, b) in product(tests_after.items(), _MARKS)
     ]
     columns = (
         Column(("variable",)),
@@ -73,7 +52,7 @@ def _posturography(results: Results, criteria: Criteria) -> Table:
         column("n", "one_way_anova.n", pair=_ALL),
         column("fp_mean fp_sd", measured, "FP M(SD)", mean_sd(2), (MEASURED, RM), True),
         *paired.means("bonferroni_t"),
-        *_ANOVA,
+        *model.columns("anova", _ALL),
         *post_hoc,
         *paired.against_rm_mass(criteria),
         REASON,
@@ -100,23 +79,13 @@ _MEASURES = {"rmse": "rmse", "pearson_r": "r", "schwer_m": "m", "schwer_p": "p",
 """Measure of the data: its name in the CSV."""
 
 _DIFFER = "r differs OM : RM"
-_BETTER = "williams_t.count_a williams_t.count_b williams_t.n"
-_OF_R = (
-    ("williams_t_median", "williams_t.statistic", "Williams t", number(2)),
-    ("williams_p_median", "williams_t.p_value", "p", p_value),
-    ("williams_om_better williams_rm_better williams_n", _BETTER, _DIFFER, counts_of),
-    ("fisher_z_median", "fisher_z.statistic", "Fisher z", number(2)),
-    ("fisher_p_median", "fisher_z.p_value", "p (z)", p_value),
-    ("fisher_om_better", "fisher_z.count_a"),
-    ("fisher_rm_better", "fisher_z.count_b"),
-)
 
 
 def _six_components(results: Results, criteria: Criteria) -> Table:
     errors = [topic for topic in results.topics if topic.variable.endswith("_rmse")]
     errors.sort(key=lambda t: (t.role == "sequence", t.task, _COMPONENTS.index(t.variable[:2])))
     of_error = list(_errors_of_six())
-    of_r = [column(*one) for one in _OF_R]
+    of_r = model.columns("correlations", differ=_DIFFER)
     named: dict[Topic, str] = {}
     rows = []
     for topic in errors:
@@ -151,7 +120,6 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
 
 
 def _errors_of_six() -> Iterator[Column]:
-    """Tests of the RMSE, of OM against each other method."""
     for one in paired.smaller_error("n_paired", "sign.n"):
         yield one
         name, pair = one.fields[0], one.of[0][2:]
@@ -174,7 +142,6 @@ def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell
 
 
 def _sibling(topic: Topic, measure: str) -> Topic:
-    """The same component and task, another measure."""
     return Topic(topic.table, topic.variable[:3] + measure, topic.task, topic.role, "1")
 
 

@@ -40,26 +40,12 @@ def _text(value: Cell) -> str:
     return str(value)
 
 
-_NAMED = {
-    "\\": "backslash",
-    "~": "asciitilde",
-    "^": "asciicircum",
-    "<": "less",
-    ">": "greater",
-    "|": "bar",
-}
-_SIGNS = str.maketrans(
-    {sign: rf"\{sign}" for sign in "{}&%$#_"}
-    | {sign: rf"\text{name}{{}}" for sign, name in _NAMED.items()}
-    | {
-        "²": r"\textsuperscript{2}",
-        "†": r"\dag{}",
-        "–": "--",
-        "×": r"$\times$",
-        "−": "$-$",
-        "\n": " ",
-    }
-)
+_NAMED = {"\\": "backslash", "~": "asciitilde", "^": "asciicircum"}
+_NAMED |= {"<": "less", ">": "greater", "|": "bar"}
+_SIGNS: dict[str | int, str | int | None] = {sign: rf"\{sign}" for sign in "{}&%$#_"}
+_SIGNS |= {sign: rf"\text{name}{{}}" for sign, name in _NAMED.items()}
+_SIGNS |= {"²": r"\textsuperscript{2}", "†": r"\dag{}", "–": "--", "×": r"$\times$", "−": "$-$"}
+_SIGNS |= {"\n": " "}
 
 
 def to_latex(table: Table) -> str:
@@ -87,7 +73,7 @@ def to_latex(table: Table) -> str:
 
 def escape_latex(text: str) -> str:
     """Text in which nothing is a command; a minus before a number becomes a minus."""
-    return re.sub(r"(?<![\w-])-(?=\.?\d)", "$-$", text.translate(_SIGNS))
+    return re.sub(r"(?<![\w-])-(?=\.?\d)", "$-$", text.translate(str.maketrans(_SIGNS)))
 
 
 def _latex_body(table: Table) -> Iterator[str]:

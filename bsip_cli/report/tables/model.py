@@ -7,6 +7,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import isnan
 from pathlib import Path
 
@@ -132,26 +133,23 @@ def unit_label(unit: str) -> str:
 
 
 def number(decimals: int) -> Callable[[float], str]:
-    return lambda value: ABSENT if isnan(value) else _rounded(value, decimals)
+    return partial(_rounded, decimals=decimals)
 
 
 def mean_sd(decimals: int) -> Callable[[float, float], str]:
     """M(SD), in whole numbers from a thousand on; one participant has no SD."""
 
     def form(mean: float, sd: float) -> str:
-        if isnan(mean):
-            return ABSENT
         places = number(0 if abs(mean) >= 1000.0 else decimals)
-        return f"{places(mean)}({places(sd)})"
+        return ABSENT if isnan(mean) else f"{places(mean)}({places(sd)})"
 
     return form
 
 
 def interval(decimals: int) -> Callable[[float, float], str]:
     def form(low: float, high: float) -> str:
-        if isnan(low) or isnan(high):
-            return ABSENT
-        return f"[{_rounded(low, decimals)}, {_rounded(high, decimals)}]"
+        ends = [_rounded(end, decimals) for end in (low, high)]
+        return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
 
     return form
 
@@ -173,21 +171,33 @@ def counts_of(a: float, b: float, n: float) -> str:
 
 
 def _rounded(value: float, decimals: int) -> str:
+    if isnan(value):
+        return ABSENT
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+_COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
+_FORMS: dict[str, Callable[..., str]] = {
+    "number": number(2),
+    "interval": interval(2),
+    "p": p_value,
+    "counts": counts_of,
+}
+
+
+def columns(name: str, pair: tuple[str, str] = (OM, RM), **words: str) -> tuple[Column, ...]:
+    """Those of ``columns.toml`` by that name; ``words`` go into the headings."""
+    found = []
+    for fields, of, heading, form, *in_row_unit in _COLUMNS[name]:
+        how = heading.format(**words), _FORMS.get(form, str), pair
+        found.append(column(fields, of, *how, in_row_unit=bool(in_row_unit)))
+    return tuple(found)
 
 
 # --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
 
 NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
-
-
-def participants(rows: Iterable[Comparison]) -> str:
-    """n = 8 participants, or the range over the rows."""
-    numbers = [row.n for row in rows] or [0]
-    low, high = min(numbers), max(numbers)
-    word = "participant" if high == 1 else "participants"
-    return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
 
 
 TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
@@ -198,8 +208,10 @@ def texts_of(
 ) -> tuple[str, tuple[str, ...]]:
     """Title and legend of a table; ``more``: what only this one says."""
     words = TEXTS["shared"] | more
-    words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
-    words["percent"] = f"{criteria.equivalence_percent:g}"
+    numbers = sorted({row.n for row in tests} or {0})
+    how_many = " to ".join(dict.fromkeys(map(str, (numbers[0], numbers[-1]))))
+    words["n"] = f"n = {how_many} participant{'' if numbers[-1] == 1 else 's'}"
+    words |= {"alpha": f"{criteria.alpha:g}", "percent": f"{criteria.equivalence_percent:g}"}
     words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
     words["star"] = f"* significant: p < {_level(criteria.alpha)}."
     words["holm"] = _holm_legend(tests, criteria.alpha)

@@ -27,50 +27,32 @@ _SEGMENTS += [f"{part}_{side}" for limb in _LIMBS for side in "lr" for part in l
 def means(test: str = "paired_t") -> tuple[model.Column, ...]:
     """Of the methods; ``test``: the one of OM and RM."""
     numbers = ((OM, test, "a", RM), (RM, test, "b", RM), (RM_MASS, "paired_t", "b", RM_MASS))
-    return tuple(
-        model.column(
+    found = []
+    for method, name, side, other in numbers:
+        fields, of = (
             f"{SHORT[method]}_mean {SHORT[method]}_sd",
             f"{name}.mean_{side} {name}.sd_{side}",
-            f"{method} M(SD)",
-            model.mean_sd(2),
-            (OM, other),
-            in_row_unit=True,
         )
-        for method, name, side, other in numbers
-    )
+        how = f"{method} M(SD)", model.mean_sd(2), (OM, other)
+        found.append(model.column(fields, of, *how, in_row_unit=True))
+    return tuple(found)
 
 
 def _tests(criteria: Criteria) -> tuple[model.Column, ...]:
     """Of OM against RM."""
     confidence = f"{100.0 * (1.0 - criteria.alpha):g}% CI"
-    ends = "paired_t.ci_low paired_t.ci_high"
-    return (
-        model.column("difference", "paired_t.difference", in_row_unit=True),
-        model.column("ci_low ci_high", ends, confidence, model.interval(2), in_row_unit=True),
-        model.column("t", "paired_t.statistic", "t", model.number(2)),
-        model.column("df", "paired_t.df1"),
-        model.column("p", "paired_t.p_value", _P[RM], model.p_value),
-        model.column("p_holm", "paired_t.p_holm"),
-        model.column("cohens_d_pooled", "paired_t.effect_size", "Cohen's d", model.number(2)),
-        model.column("lilliefors_p", "paired_t.lilliefors_p", "Lilliefors p", model.p_value),
-        model.column("wilcoxon_w", "wilcoxon.statistic"),
-        model.column("wilcoxon_p", "wilcoxon.p_value", "Wilcoxon p", model.p_value),
-        model.column("rank_biserial", "wilcoxon.effect_size"),
-        model.column("d_z", "d_z.effect_size", "d_z", model.number(2)),
-    )
+    return model.columns("paired", ci=confidence, p=_P[RM])
 
 
 def against_rm_mass(criteria: Criteria) -> tuple[model.Column, ...]:
     """The same tests with RM+mass, of which only p is printed."""
-    return tuple(
-        replace(
-            one,
-            fields=tuple(_PREFIX[RM_MASS] + name for name in one.fields),
-            heading=_P[RM_MASS] if one.heading == _P[RM] else "",
-            of=tuple((test, name, OM, RM_MASS) for test, name, *_ in one.of),
-        )
-        for one in _tests(criteria)
-    )
+    found = []
+    for one in _tests(criteria):
+        fields = tuple(_PREFIX[RM_MASS] + name for name in one.fields)
+        heading = _P[RM_MASS] if one.heading == _P[RM] else ""
+        of = tuple((test, name, OM, RM_MASS) for test, name, *_ in one.of)
+        found.append(replace(one, fields=fields, heading=heading, of=of))
+    return tuple(found)
 
 
 def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[model.Column]:
@@ -140,33 +122,15 @@ def segment_mass(results: model.Results, criteria: Criteria) -> model.Table:
     def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
         of_share = Topic(topic.table, topic.variable + DATA_SHARE, topic.task, topic.role, "1")
         share = results.find(of_share, "description", OM, "")
-        own: dict[str, model.Cell] = {
-            "mass_data_share": share.mean_a,
-            "mass_data_share_sd": share.sd_a,
-        }
-        return own | {"segment": topic.variable}, ""
+        own: dict[str, model.Cell] = {"segment": topic.variable, "mass_data_share": share.mean_a}
+        return own | {"mass_data_share_sd": share.sd_a}, ""
 
-    return _paired(
-        "table1_segment_mass",
-        tests,
-        (
-            (
-                model.Column(("segment",), "Segment", segment_label, text=True),
-                model.column("n", "paired_t.n"),
-                *means(),
-            ),
-            (
-                model.column("equivalence_bound", "tost.bound", in_row_unit=True),
-                model.column("equivalence_t", "tost.statistic"),
-                model.column("equivalence_p", "tost.p_value", "equivalence p", model.p_value),
-                model.Column(("mass_data_share",), "data share", model.number(2)),
-                model.Column(("mass_data_share_sd",)),
-            ),
-        ),
-        {topic: segment_label(topic.variable) for topic in segments},
-        row,
-        (results, criteria),
-    )
+    segment = model.Column(("segment",), "Segment", segment_label, text=True)
+    share = model.Column(("mass_data_share",), "data share", model.number(2))
+    after = (*model.columns("equivalence"), share, model.Column(("mass_data_share_sd",)))
+    columns = (segment, model.column("n", "paired_t.n"), *means()), after
+    named, given = {one: segment_label(one.variable) for one in segments}, (results, criteria)
+    return _paired("table1_segment_mass", tests, columns, named, row, given)
 
 
 def cop_rmse(results: model.Results, criteria: Criteria) -> model.Table:
@@ -174,14 +138,13 @@ def cop_rmse(results: model.Results, criteria: Criteria) -> model.Table:
     tests = [results.find(topic, "paired_t") for topic in results.topics]
     differ = len({test.n for test in tests}) > 1
     axis = model.Column(("axis",), "RMSE", _AXES.__getitem__, text=True)
-    return _paired(
-        "table2_cop_rmse",
-        tests,
-        ((axis, *[_N] * differ, *means()), tuple(smaller_error())),
-        {topic: _AXES[topic.variable] for topic in results.topics},
-        lambda topic: ({"axis": topic.variable}, ""),
-        (results, criteria),
-    )
+    columns = (axis, *[_N] * differ, *means()), tuple(smaller_error())
+    named, given = {topic: _AXES[topic.variable] for topic in results.topics}, (results, criteria)
+
+    def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
+        return {"axis": topic.variable}, ""
+
+    return _paired("table2_cop_rmse", tests, columns, named, row, given)
 
 
 def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
@@ -193,24 +156,16 @@ def cross_validation(results: model.Results, criteria: Criteria) -> model.Table:
     tests = [results.find(topic, "paired_t") for topic in topics]
 
     def row(topic: Topic) -> tuple[dict[str, model.Cell], str]:
-        own: dict[str, model.Cell] = {
-            "quantity": topic.variable,
-            "task": topic.task,
-            "role": topic.role,
-        }
+        own: dict[str, model.Cell] = {"quantity": topic.variable, "task": topic.task}
+        own["role"] = topic.role
         group = f"{_QUANTITIES[topic.variable]} [{model.unit_label(topic.unit)}]"
         return own | {"label": task_label(topic)}, group
 
     label = model.Column(("label",), "Movement", text=True)
     place = [model.Column((name,)) for name in ("quantity", "task", "role")]
-    return _paired(
-        "table4_cross_validation",
-        tests,
-        ((*place, label, _N, *means()), tuple(smaller_error())),
-        {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics},
-        row,
-        (results, criteria),
-    )
+    columns = (*place, label, _N, *means()), tuple(smaller_error())
+    named = {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics}
+    return _paired("table4_cross_validation", tests, columns, named, row, (results, criteria))
 
 
 def centres_of_mass(results: model.Results, criteria: Criteria) -> model.Table:
@@ -239,15 +194,9 @@ def centres_of_mass(results: model.Results, criteria: Criteria) -> model.Table:
     both = "description.mean_a description.sd_a"
     apart = "apart_mean apart_sd", both, "|OM - RM| M(SD)", model.mean_sd(2), (DIFFERENCE, ""), True
     label = model.Column(("label",), "Quantity", text=True)
-    return _paired(
-        "table6_centres_of_mass",
-        tests,
-        ((model.Column(("variable",)), label, _N, *means(), model.column(*apart)), ()),
-        named,
-        row,
-        (results, criteria),
-        in_print="; ".join(_in_print()),
-    )
+    columns = (model.Column(("variable",)), label, _N, *means(), model.column(*apart)), ()
+    name, printed, given = "table6_centres_of_mass", "; ".join(_in_print()), (results, criteria)
+    return _paired(name, tests, columns, named, row, given, in_print=printed)
 
 
 def _in_print() -> Iterator[str]:

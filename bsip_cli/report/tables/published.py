@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from math import nan
 
 from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table, count, mean_sd
-from bsip_cli.statistics.cohort import Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import Paper, PrintedTable, load_paper
 from bsip_cli.statistics.published import Row as PrintedRow
@@ -38,13 +37,8 @@ def printed(paper: Paper, table: PrintedTable) -> Table:
 
 def audited(paper: Paper) -> Table:
     """What a paper's own numbers contradict."""
-    headings = {
-        "row": "Where",
-        "what": "What",
-        "printed": "In print",
-        "recomputed": "From its other numbers",
-        "reading": "Likely reading",
-    }
+    headings = {"row": "Where", "what": "What", "printed": "In print"}
+    headings |= {"recomputed": "From its other numbers", "reading": "Likely reading"}
     columns = tuple(Column((name,), heading, text=True) for name, heading in headings.items())
     rows = tuple(Row(slip, group=f"Table {slip['table']}") for slip in paper.slips)
     title = f"{paper.name}: what cannot be as printed."
@@ -93,14 +87,16 @@ def next_to_published(tag: str, results: Results) -> Table:
 
 
 def _here(method: str, of: str = "") -> tuple[str, str]:
-    """Names of the CSV columns of mean and standard deviation."""
     name = method.lower().replace(" ", "_").replace("+", "_")
     return f"{name}{of}_mean", f"{name}{of}_sd"
 
 
 def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
-    """This study's n, means and standard deviations by the paper's names of the methods."""
-    topic = _topic(results, row)
+    variable, _, task = row.compare.partition(" ")
+    topic = None  # the same variable, in the task of that name where the row is of one
+    for one in (one for one in results.topics if one.variable == variable):
+        role_fits = one.role == "sequence" if task == "sequence" else task in ("", one.task)
+        topic = topic or (one if role_fits else None)
     if topic is None:
         return {}
     found = [results.find(topic, "paired_t")]
@@ -113,16 +109,6 @@ def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
         numbers = (pair.mean_a, pair.sd_a, pair.mean_b, pair.sd_b)
         values |= dict(zip(fields, numbers, strict=True))
     return values
-
-
-def _topic(results: Results, row: PrintedRow) -> Topic | None:
-    """The same variable of this study, in the task of that name where the row is of one."""
-    variable, _, task = row.compare.partition(" ")
-    for topic in results.topics:
-        role_fits = topic.role == "sequence" if task == "sequence" else task in ("", topic.task)
-        if topic.variable == variable and role_fits:
-            return topic
-    return None
 
 
 def _notes(paper: Paper, as_printed: PrintedTable, meant: PrintedTable) -> Iterator[str]:

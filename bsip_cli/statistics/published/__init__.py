@@ -110,36 +110,23 @@ def load_paper(name: str) -> Paper:
     data = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
     tables = data["tables"]
     lines = (FOLDER / "audit.csv").read_text(encoding="utf-8").splitlines()
-    return Paper(
-        data["key"],
-        data["name"],
-        data["citation"],
-        data["url"],
-        tables=tuple(map(_table, tables)),
-        slips=tuple(slip for slip in csv.DictReader(lines) if slip["paper"] == name),
-        is_audited=any(one["design"] != "described" or "claims" in one for one in tables),
-    )
+    slips = tuple(slip for slip in csv.DictReader(lines) if slip["paper"] == name)
+    is_audited = any(one["design"] != "described" or "claims" in one for one in tables)
+    about = data["key"], data["name"], data["citation"], data["url"]
+    return Paper(*about, tuple(map(_table, tables)), slips, is_audited)
 
 
 def _table(data: Mapping[str, Any]) -> PrintedTable:
     methods, unit = tuple(data["methods"]), data.get("unit", "")
-    return PrintedTable(
-        data["number"],
-        data["about"],
-        methods,
-        tuple(_row(methods, {"unit": unit, **row}) for row in data["rows"]),
-        tuple((row, method) for row, method in data.get("exchanged", ())),
-        data.get("fits_unit", ""),
-    )
+    rows = tuple(_row(methods, {"unit": unit, **row}) for row in data["rows"])
+    exchanged = tuple((row, method) for row, method in data.get("exchanged", ()))
+    head = data["number"], data["about"], methods
+    return PrintedTable(*head, rows, exchanged, data.get("fits_unit", ""))
 
 
 def _row(methods: tuple[str, ...], printed: Mapping[str, str]) -> Row:
-    return Row(
-        printed["name"],
-        printed["unit"],
-        printed.get("compare", printed.get("key", "")),
-        printed.get("error_of", ""),
-        printed.get("ci", ""),
-        cells={method: Cell.of(printed[method]) for method in methods if method in printed},
-        tests={name: printed[name] for name in TESTS if name in printed},
-    )
+    compare = printed.get("compare", printed.get("key", ""))
+    words = printed["name"], printed["unit"], compare, printed.get("error_of", "")
+    cells = {method: Cell.of(printed[method]) for method in methods if method in printed}
+    tests = {name: printed[name] for name in TESTS if name in printed}
+    return Row(*words, printed.get("ci", ""), cells, tests)

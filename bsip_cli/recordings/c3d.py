@@ -40,6 +40,7 @@ _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
 _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
 _USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
+_HEAD = re.compile(r"[^\W_]+[_.\- ]+")  # of the person, in front of most labels
 _SAME_PLACE_M = 1e-3  # as precise as corners are written
 _PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, that can be distinguished
 _FIRST_YEAR = 1987  # of the format
@@ -178,14 +179,17 @@ def _model_outputs(group: Group, labels: Sequence[str]) -> set[int]:
     """
     keys = {*(name.upper() for name in texts(group, "TYPE_GROUPS")[::2]), *_OUTPUT_GROUPS}
     listed = {name for key in keys for name in texts(group, key)}
-    bare = [label.split(":")[-1] for label in labels]
+    names = [label.split(":")[-1] for label in labels]
+    heads = Counter(found[0] for name in names if (found := _HEAD.match(name)))
+    head, number = max(heads.items(), key=lambda one: one[1], default=("", 0))
+    bare = [name.removeprefix(head if 2 * number > len(names) else "") for name in names]
     stems = {label[:-1] for label in bare if label[-1:] == "O" and len(label) >= 3}
     drawn = [{stem + ending for ending in _AXIS_ENDINGS} for stem in stems]
     axes = {name for axes in drawn if axes <= set(bare) for name in axes}
     return {
         i
         for i, label in enumerate(labels)
-        if label and (label in listed or bare[i] in axes or _OUTPUT_NAMES.match(bare[i]))
+        if label and ({label, bare[i]} & listed or bare[i] in axes or _OUTPUT_NAMES.match(bare[i]))
     }
 
 

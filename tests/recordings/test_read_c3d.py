@@ -268,23 +268,25 @@ def test_clipped_and_stuck_samples(tmp_path):
     assert _levels(recording, "analog_clipped") == ["warning"]
 
 
-def test_model_outputs_and_unlabelled_points_are_dropped(tmp_path):
+@pytest.mark.parametrize("head", ["", "Tom:", "Tom_", "S01-"])
+def test_model_outputs_and_unlabelled_points_are_dropped(tmp_path, head):
     markers, labels = standing_markers(N)
     extra = [
         "LHipAngles",
         "LKneeMoment",
-        "*41",
+        "LKneeTwist",
         "PELO",
         "PELA",
         "PELL",
         "PELP",
         "RGroundReactionForce",
     ]
+    labels = [head + label for label in labels]
     path = write_c3d(
         tmp_path / "a.c3d",
-        np.concatenate([markers, 1.0 + np.zeros((N, len(extra), 3))], axis=1),
-        labels + extra,
-        point_parameters={"ANGLES": ["LHipAngles"]},
+        np.concatenate([markers, 1.0 + np.zeros((N, len(extra) + 1, 3))], axis=1),
+        [*labels, *(head + label for label in extra), "*41"],
+        point_parameters={"ANGLES": ["LHipAngles", "LKneeTwist"]},
     )
     assert read_recording(path).labels == tuple(labels)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -68,14 +69,14 @@ def check_samples(
     is_natural = 2 * absent.sum() > unloaded.sum() or not (load[1:] * load[:-1] < 0).any()
     gone = absent & is_natural
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
-    moves = any(np.ptp(np.nan_to_num(channel)) > 0 for channel in counts.T)
-    for i, channel in enumerate(counts.T):
-        if moves and np.ptp(channels[:, i]) == 0 and (channels[0, i] or not load.any()):
+    noises = [_noise_beyond_rounding(channel) for channel in counts.T]
+    dead = _dead(channels, load, noises)
+    for i, (channel, noise) in enumerate(zip(counts.T, noises, strict=True)):
+        if dead[i]:
             stuck[:, i] = bool(channels[0, i])
-            silent += [] if stuck[0, i] else [i]
+            silent += [] if channels[0, i] else [i]
             continue
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
-        noise = _noise_beyond_rounding(channel)
         stuck[:, i] = _stuck(channel, noise, load, gone, spikes, rate_hz, channels.shape[1])
         noisy += noise
         if stuck[:, i].any() and not np.nan_to_num(channel).any():
@@ -93,6 +94,23 @@ def check_samples(
         spikes=spikes & ~clipped & ~lost,
         silent_channels=tuple(silent),
     )
+
+
+def _dead(channels: np.ndarray, load: np.ndarray, noises: Sequence[np.ndarray]) -> np.ndarray:
+    """Channels (k,) of one value throughout, the load's among them, while others show noise, which
+    it would have too, and change as under a foot."""
+    n = len(channels)
+    constant = np.ptp(np.nan_to_num(channels), axis=0) if n else np.ones(channels.shape[1])
+    others = np.nan_to_num(channels)[:, constant > 0]
+    if (
+        constant.all()
+        or np.ptp(np.nan_to_num(load)) > 0
+        or not np.ptp(others, axis=0).max(initial=0.0) > _TOUCHED
+    ):
+        return np.zeros(len(constant), bool)
+    shown = max((int(noise.sum()) for noise in noises), default=0)
+    is_noisy = shown >= np.log2(n * len(constant) / _FALSE_POSITIVE)
+    return np.asarray((constant == 0) & is_noisy)
 
 
 def _lost(

@@ -224,3 +224,24 @@ def test_what_is_lost_is_said_with_channel_and_time():
     (one,) = [f for f in found if f.check == "analog_stuck"]
     assert one.subject == "2"
     assert "channel 2 4.100 to 4.300 s; channel 6 2.200 to 2.350 s" in one.found
+
+
+@pytest.mark.parametrize(("level", "said"), [(312.5, "stuck"), (0.0, "silent")])
+def test_a_vertical_force_of_one_value_while_the_others_work(level, said):
+    rng = np.random.default_rng(4)
+    channels = rng.normal(0.0, 1.0, (2000, 6))
+    channels[:, 3] += 40.0 * np.sin(np.arange(2000) / 150.0)
+    channels[:, 2] = level
+    found = check_samples(channels, channels / 0.01, channels[:, 2], 1000.0)
+    assert found.silent_channels == ((2,) if said == "silent" else ())
+    assert found.stuck[:, 2].all() == (said == "stuck") and not found.stuck[:, [0, 1, 3, 4]].any()
+
+
+def test_a_calm_load_and_a_calm_plate_are_no_dead_channel():
+    smooth = np.zeros((2000, 6))
+    smooth[:, 2], smooth[:, 3] = 600.0, 40.0 * np.sin(np.arange(2000) / 150.0)
+    unloaded = np.random.default_rng(5).integers(-1, 2, (2000, 6)).astype(float)
+    unloaded[:, 2] = 3.0
+    for channels in (smooth, unloaded):
+        found = check_samples(channels, channels / 0.01, channels[:, 2], 1000.0)
+        assert not found.stuck[:, 2].any() and found.silent_channels == ()

@@ -242,7 +242,7 @@ def _other_pace(times: float, rate_hz: float) -> str:
 def _not_its_own(recording: Recording, session: SessionReading) -> str:
     """Why this trial's forces are not those of its markers; empty if they may be.
 
-    Raises BadDataError where its markers are those of no person, but of the other trials' one.
+    Raises BadDataError where left and right are exchanged in this trial alone.
     """
     name, give = recording.path.stem, "give each trial its own force table"
     if session.odd.get(name) == "sides":
@@ -260,7 +260,7 @@ def _not_its_own(recording: Recording, session: SessionReading) -> str:
         )
     if unit := session.odd.get(name):
         return (
-            "in N they carry another mass than the forces of the session's other trials, as if "
+            "read in N, they carry another mass than those of the session's other trials, as if "
             f"they were in {unit}; export all in N"
         )
     if twin := session.twins.get(name):

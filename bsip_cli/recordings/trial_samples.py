@@ -78,7 +78,7 @@ class Lags:
     path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def steps_s(self) -> np.ndarray:
-        """Of the path."""
+        """When the centre of mass is where the path has it, (m,)."""
         return (self.seconds[1] - self.seconds[0]) * np.arange(len(self.path_m))
 
     def _now(self) -> np.ndarray:

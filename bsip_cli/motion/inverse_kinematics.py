@@ -340,7 +340,8 @@ def _columns(
         part = slice(start, start + _BLOCK)
         R, p = tree.forward(q[part])
         model = model_markers(person, R, p).take(chosen, axis=1)
-        yield part, pose_columns(tree, R, p, model, below), R[:, person.marker_segments[chosen]]
+        axes = R[:, person.marker_segments.take(chosen)]
+        yield part, pose_columns(tree, R, p, model, below), axes
 
 
 def _flat(x: np.ndarray) -> np.ndarray:

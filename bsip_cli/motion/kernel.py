@@ -259,7 +259,7 @@ def _bend(d, w, sums, tree, N, H):
 
 
 @compiled
-def _factor(H, damping, L):
+def _factor(H, damping, v_parents, L):
     """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
 
     Returns whether the matrix is positive definite.
@@ -271,25 +271,35 @@ def _factor(H, damping, L):
     for k in range(nv - 1, -1, -1):
         definite &= L[k, k] > 0
         L[k, k] = np.sqrt(max(L[k, k], 1e-12))
-        for i in range(k):
+        i = v_parents[k]
+        while i >= 0:
             L[k, i] /= L[k, k]
-        for i in range(k):
-            if L[k, i] != 0.0:
-                for j in range(i + 1):
-                    L[i, j] -= L[k, i] * L[k, j]
+            i = v_parents[i]
+        i = v_parents[k]
+        while i >= 0:
+            j = i
+            while j >= 0:
+                L[i, j] -= L[k, i] * L[k, j]
+                j = v_parents[j]
+            i = v_parents[i]
     return definite
 
 
 @compiled
-def _solve(L, x):
+def _solve(L, v_parents, x):
     """x <- (L^T L)^-1 x."""
-    for i in range(len(x) - 1, -1, -1):
+    nv = v_parents.size
+    for i in range(nv - 1, -1, -1):
         x[i] /= L[i, i]
-        for j in range(i):
+        j = v_parents[i]
+        while j >= 0:
             x[j] -= L[i, j] * x[i]
-    for i in range(len(x)):
-        for j in range(i - 1, -1, -1):
+            j = v_parents[j]
+    for i in range(nv):
+        j = v_parents[i]
+        while j >= 0:
             x[i] -= L[i, j] * x[j]
+            j = v_parents[j]
         x[i] /= L[i, i]
 
 
@@ -333,10 +343,10 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         if newton:
             _bend(d, w, sums, tree, N, H)
         while damping < 1e6:
-            definite = _factor(H, damping, L)
+            definite = _factor(H, damping, tree.v_parents, L)
             if definite or not newton:
                 dv[:] = g
-                _solve(L, dv)
+                _solve(L, tree.v_parents, dv)
                 _step(q, dv, tree, base, trial)
                 trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
                 if trial_cost <= cost * (1 + 1e-14):
@@ -358,7 +368,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
             taken = step + 1
             break
     _assemble(d, w, sums, q, tree, task, H, g)
-    _factor(H, 0.0, L)
+    _factor(H, 0.0, tree.v_parents, L)
     return taken
 
 

@@ -277,6 +277,7 @@ def _read_plate(
         raise _UnusablePlateError(found, "the half distances a and b of the sensors")
     rows = _channel_rows(group, kind, index, len(content.analog))
     raw, scales = content.analog[rows].T, content.analog_scales[rows]
+    _check_apart(kind, rows, raw)
     if not np.isfinite(scales).all() or not scales.any():  # one of size zero does not answer
         size = next((s for s in scales if not np.isfinite(s)), 0.0)
         found = f"ANALOG:GEN_SCALE times SCALE is {size:g}"
@@ -304,6 +305,17 @@ def _read_plate(
         source = replace(source, measured=source.measured - mean)
     about_samples = [*sample_findings(name, samples, rate_hz), *filter(None, [subtracted])]
     return source, [*about_size, *about_origin, *about_units], about_samples
+
+
+def _check_apart(kind: int, rows: np.ndarray, raw: np.ndarray) -> None:
+    """Two channels that are one, or a copy, measure no two things; single sensors of a symmetric
+    load may be equal where somebody computed them."""
+    names = CHANNELS_OF[kind]
+    for i, j in combinations(range(len(names)), 2):
+        copied = kind != 3 and np.ptp(raw[:, i]) > 0 and np.array_equal(raw[:, i], raw[:, j])
+        if rows[i] == rows[j] or copied:
+            found = f"its {names[i]} and {names[j]} hold the same numbers"
+            raise _UnusablePlateError(found, "an analog channel for each in FORCE_PLATFORM:CHANNEL")
 
 
 def _kind(group: Group, index: int) -> int:
@@ -380,6 +392,11 @@ def _channel_rows(group: Group, kind: int, index: int, n_analog: int) -> np.ndar
         claimed = rows.max() + 1 if rows.max() >= n_analog else 0
         found = f"it claims analog channel {claimed}"
         raise _UnusablePlateError(found, f"one of the file's {n_analog}")
+    for other in set(range(min(_n_plates(group), table.shape[1]))) - {index}:
+        shared = np.isin(rows, table[:, other] - 1)
+        if shared.any() and not shared.all():  # all: a copy
+            found = f"analog channel {rows[shared][0] + 1} is also listed for plate {other + 1}"
+            raise _UnusablePlateError(found, "channels of its own in FORCE_PLATFORM:CHANNEL")
     return rows
 
 

@@ -90,7 +90,7 @@ class PlateFit:
     """A reading, with its sign and its fixed point, and how well it makes forces under feet.
 
     For each of n trials that have the plate: from the parts to the wrench, ``matrices`` (6, k), and
-    what it shows, ``found`` (n, 8), with its logarithmic likelihood, of all trials together; that
+    what it shows, ``found`` (n, 9), with its logarithmic likelihood, of all trials together; that
     of its sensors is ``of_sensors``.
     """
 

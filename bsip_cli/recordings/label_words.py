@@ -37,6 +37,11 @@ class Meaning:
     landmark: str
     weight: float = field(default=1.0, compare=False)  # how far the marker is trusted
 
+    @property
+    def is_of_foot(self) -> bool:
+        """The ankle's bones among it."""
+        return self.segment.startswith("foot") or self.landmark.startswith("malleolus")
+
 
 @dataclass(frozen=True)
 class _Reading:

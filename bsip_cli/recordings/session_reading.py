@@ -28,7 +28,7 @@ from bsip_cli.recordings.plate_reading import (
 from bsip_cli.recordings.scene import Handedness, Stature
 from bsip_cli.recordings.shared_forces import Course, of_twins
 from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, surest
-from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, is_on_surface, outline
 from bsip_cli.recordings.written import (
     AS_WRITTEN,
     Written,
@@ -384,6 +384,9 @@ def _fault(found: Evidence) -> str:
         return f"its centre of pressure lies {found.distance_m:.2f} m beside the feet on the ground"
     if not np.isfinite(found.distance_m) and found.outside_m > BESIDE_M:
         return f"its centre of pressure lies {found.outside_m:.2f} m outside the plate"
+    if np.isfinite(found.above_m) and not is_on_surface(found.above_m):
+        way = "below" if found.above_m > 0 else "above"
+        return f"its surface lies {abs(found.above_m):.2f} m {way} the foot's lowest marker on it"
     return ""
 
 

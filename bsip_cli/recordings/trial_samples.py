@@ -18,7 +18,6 @@ from scipy.special import logsumexp
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Balance, Body, GateLimits
-from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     FrameChange,
@@ -276,9 +275,6 @@ class TrialSamples:
         samples = np.unique(np.concatenate(few)) if few else np.zeros(0, int)
         frames = np.round(samples * recording.marker_rate_hz / rate_hz).astype(int)
         samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
-        known = meanings(recording.labels)
-        sides = [known[n].segment[-1] if n in known else "" for n in recording.labels]
-        sides = [side if side in "lr" else "" for side in sides]
         floor = sources[0].floor_m() if sources else 0.0
         return cls(
             name=recording.path.stem,
@@ -289,7 +285,7 @@ class TrialSamples:
             sources={s.name: s.at(samples) for s in sources},
             smooth={s.name: s.smoothed(SMOOTH_S * rate_hz).at(samples) for s in sources},
             loaded={s.name: heavy[s.name][samples] for s in sources},
-            feet=Feet.of(markers, sides, frames, floor if abs(floor) < 1.0 else 0.0),
+            feet=Feet.of(recording.labels, markers, frames, floor),
             body=Body.of(segments if sources else {}, recording.marker_rate_hz, frames),
         )
 

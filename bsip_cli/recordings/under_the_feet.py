@@ -4,7 +4,8 @@ One measure for every format and every way in which a plate's numbers may be mis
 of pressure against the feet on the ground, against the outline and the sensor, the moments at it.
 The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
-the vertical moment over the force is 3 mm, in golf swings 60, in one quiet stance 0.024 at least.
+the vertical moment over the force is 3 mm, in golf swings 60, in one quiet stance 0.024 at least;
+the lowest marker of a foot is 0 to 102 mm above the surface, a computed one 46 mm below it.
 
 A leg can turn little about its hip, so that the force under a foot leans from its centre of
 pressure towards the body: of the slope to the centre of mass it has 0.63 in the median over 66
@@ -19,10 +20,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.plates import cop_at_height
 
 BESIDE_M = 0.12
 """Half a foot's length: a centre of pressure so far beside the feet is not under them."""
+
+LOWEST_M = (-0.06, 0.17)
+"""Where, over the surface, a foot's lowest marker is: computed ones err, some sets have ankles."""
 
 _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
 _LITTLE_TORQUE_M = 3e-5  # below it the likelihood falls too: soles hardly make less
@@ -34,7 +39,6 @@ _RARE = -4.6  # an outline is stated wrongly, vertical moments are left out, in 
 _INDEPENDENT = 3.0  # numbers of a trial that must agree by chance
 _LEAST_SHARE, _HAIR_M = 1e-3, 1e-5  # how nearly they can
 _FURTHEST_M, _NO_LOAD_N = 1e4, 1e-6
-_LOW_M = 0.17  # ankles and below
 _LIFT_M = 0.035  # over a marker's own lowest height: the foot is in the air
 _RIM_M = 0.05
 # A distance is short by 1 - cos(2.5 degrees), a thousandth, between two of these.
@@ -44,31 +48,42 @@ _DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])  # (2, k)
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen.
+    """Places of foot markers on the ground, (n, k, 3); NaN: in the air, unseen.
 
-    sides : whose they are, "l", "r" or empty, k of them.
+    sides : whose they are, "l", "r" or empty, k of them. is_foot : by what their labels say, (k,).
     """
 
     points_m: np.ndarray
     sides: tuple[str, ...]
+    is_foot: tuple[bool, ...] = ()
 
     @classmethod
     def of(
-        cls, markers_m: np.ndarray, sides: Sequence[str], frames: np.ndarray, floor_m: float
+        cls, labels: Sequence[str], markers_m: np.ndarray, frames: np.ndarray, floor_m: float
     ) -> Feet:
-        """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
-        height = markers_m[..., 2] - floor_m
-        standing = lowest(height)
-        feet = np.flatnonzero(standing < _LOW_M)
-        points = markers_m[np.ix_(frames, feet)][..., :2].copy()
-        points[height[np.ix_(frames, feet)] - standing[feet] > _LIFT_M] = np.nan
-        return cls(points, tuple(sides[k] for k in feet.tolist()))
+        """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,); the
+        surface is where the plates have it, unless feet can never stand there."""
+        known = meanings(labels)
+        sides = [known[n].segment[-1] if n in known else "" for n in labels]
+        is_foot = np.array([n in known and known[n].is_of_foot for n in labels], bool)
+        standing = lowest(markers_m[..., 2])
+        sole = standing[is_foot].min(initial=np.inf)
+        if np.isfinite(sole) and not is_on_surface(sole - floor_m):
+            floor_m = sole
+        feet = np.flatnonzero(standing < floor_m + LOWEST_M[1])
+        points = markers_m[np.ix_(frames, feet)]
+        points[points[..., 2] - standing[feet] > _LIFT_M] = np.nan
+        return cls(
+            points,
+            tuple(sides[k] if sides[k] in "lr" else "" for k in feet.tolist()),
+            tuple(is_foot[feet].tolist()),
+        )
 
     def on(self, corners_m: np.ndarray | None) -> Feet:
         """Those on a plate of these corners (4, 3), where any are, else all."""
         if corners_m is None:
             return self
-        beyond = _beyond(self.points_m, corners_m)
+        beyond = _beyond(self.points_m[..., :2], corners_m)
         inside = (beyond <= _RIM_M).all(axis=-1)
         some = np.any(inside, axis=1, keepdims=True)
         points = np.where((inside | ~some)[..., None], self.points_m, np.nan)
@@ -79,7 +94,7 @@ class Feet:
         corners (4, 3)."""
         on = np.isnan(self.points_m[..., 0])
         for corners_m in outlines:
-            on = on | (_beyond(self.points_m, corners_m) <= _RIM_M).all(axis=-1)
+            on = on | (_beyond(self.points_m[..., :2], corners_m) <= _RIM_M).all(axis=-1)
         return self.both_seen and bool(outlines) and bool(on.all())
 
     @property
@@ -91,7 +106,13 @@ class Feet:
 
     def moved(self, change: np.ndarray) -> Feet:
         """In other axes of the world (3, 3)."""
-        return replace(self, points_m=self.points_m @ change[:2, :2].T)
+        return replace(self, points_m=self.points_m @ change.T)
+
+    def lowest_m(self) -> np.ndarray:
+        """Height of the lowest marker whose label says that it is on a foot, (n,); NaN without."""
+        heights = self.points_m[:, np.array(self.is_foot, bool), 2]
+        lowest_m = np.min(np.where(np.isfinite(heights), heights, np.inf), axis=1, initial=np.inf)
+        return np.where(np.isfinite(lowest_m), lowest_m, np.nan)
 
     def distance_m(self, places_m: np.ndarray, apart: np.ndarray) -> np.ndarray:
         """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;
@@ -105,7 +126,8 @@ class Feet:
 
     def _distance_m(self, places_m: np.ndarray, columns: Sequence[bool]) -> np.ndarray:
         """The largest, over all directions, by which a place lies further out than every marker."""
-        reach = self.points_m[:, np.array(columns, bool)] @ _DIRECTIONS  # (n, k, directions)
+        some = self.points_m[:, np.array(columns, bool), :2]
+        reach = some @ _DIRECTIONS  # (n, k, directions)
         furthest = np.max(np.where(np.isfinite(reach), reach, -np.inf), axis=1, initial=-np.inf)
         beyond = np.max(places_m @ _DIRECTIONS - furthest, axis=-1)
         return np.where(np.isfinite(beyond), np.maximum(beyond, 0.0), np.nan)
@@ -116,6 +138,7 @@ class Evidence:
     """What a reading makes of a plate's numbers [m]; NaN where it cannot be known.
 
     distance_m : of the centre of pressure from the feet, mean; outside_m : from the outline, mean;
+    above_m : the lowest marker of a foot above the surface, median;
     sway_m : its standard deviation; lever_m : its distance from the sensor as the moments have it;
     torque_m, level_m : vertical and horizontal moment at it over the force, median; level_share :
     of the horizontal moment as written, what a reading leaves [1]; astray : how far the force under
@@ -124,6 +147,7 @@ class Evidence:
 
     distance_m: float
     outside_m: float
+    above_m: float
     sway_m: float
     lever_m: float
     torque_m: float
@@ -145,7 +169,7 @@ def evidence(
     level_Nm: tuple[np.ndarray, np.ndarray] | None,
     body_m: np.ndarray,
 ) -> np.ndarray:
-    """What each of r readings makes of n loaded samples, (r, 8): columns as in `Evidence`.
+    """What each of r readings makes of n loaded samples, (r, 9): columns as in `Evidence`.
 
     wrench : (r, n, 6), about the world's origin. floor_m : (r,). feet : on the plate's place.
     apart : (n,), where each foot stands on a plate of its own.
@@ -166,21 +190,24 @@ def evidence(
     table[0] = _mean(feet.at(known).distance_m(cop, apart[known]))
     if corners_m is not None:
         table[1] = _mean(np.linalg.norm(_beyond(cop, corners_m), axis=-1))
-    table[2] = _spread(cop)
+    above = feet.at(known).lowest_m() - floor_m[:, None]
+    if np.isfinite(above).any():
+        table[2] = np.nanmedian(above, axis=1)
+    table[3] = _spread(cop)
     if lever_m is not None:
-        table[3] = np.sqrt(_mean(lever_m[:, known] ** 2))
-    table[4] = np.median(np.abs(torque) / load, axis=1)
-    table[4][table[4] == 0.0] = np.nan  # none is written
+        table[4] = np.sqrt(_mean(lever_m[:, known] ** 2))
+    table[5] = np.median(np.abs(torque) / load, axis=1)
+    table[5][table[5] == 0.0] = np.nan  # none is written
     if level_Nm is not None:
         read, written = (x[:, known] for x in level_Nm)
-        table[5], table[6] = np.median(read / load, axis=1), _left_share(read, written, load)
-    table[7] = _astray(force, cop, floor_m, body_m[known], apart[known])
+        table[6], table[7] = np.median(read / load, axis=1), _left_share(read, written, load)
+    table[8] = _astray(force, cop, floor_m, body_m[known], apart[known])
     return table.T
 
 
 def log_likelihood(found: np.ndarray) -> np.ndarray:
-    """Up to a constant: how likely a person's foot makes such numbers (..., 8), logarithm."""
-    distance, outside, _, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
+    """Up to a constant: how likely a person's foot makes such numbers (..., 9), logarithm."""
+    distance, outside, _, _, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
     terms = [
         falling(distance, _DISTANCE_M),
         np.clip(falling(outside, _DISTANCE_M), _RARE, 0.0),
@@ -197,12 +224,17 @@ def log_likelihood(found: np.ndarray) -> np.ndarray:
 def lever_log_likelihood(found: np.ndarray) -> np.ndarray:
     """The part of how the moments go with a lever about the sensor: it distinguishes readings, and
     no person from nobody, since a file may give moments about its own origin."""
-    return np.nan_to_num(2.0 * np.log(np.clip(found[..., 3] / _LEVER_M, _LEAST, 1.0)))
+    return np.nan_to_num(2.0 * np.log(np.clip(found[..., 4] / _LEVER_M, _LEAST, 1.0)))
 
 
 def mean_evidence(found: np.ndarray) -> Evidence:
-    """Over several trials (n, 8), of what is known in them."""
+    """Over several trials (n, 9), of what is known in them."""
     return Evidence(*_mean(found.T).tolist())
+
+
+def is_on_surface(above_m: float) -> bool:
+    """Whether the lowest marker of a foot on the ground may be so far above the surface."""
+    return LOWEST_M[0] < above_m < LOWEST_M[1]
 
 
 def falling(size: float | np.ndarray, scale: float | np.ndarray) -> np.ndarray:

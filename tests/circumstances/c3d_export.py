@@ -83,13 +83,16 @@ def _add_plates(
     ]
     analog["UNITS"]["value"] = [unit for plate in plates for unit in plate.units]
     content["data"]["analogs"] = channels.T[None]
+    listed = np.arange(1, count * len(plates) + 1).reshape(-1, count).T
+    for plate, (one, other) in export.listed_twice.items():
+        listed[other, plate] = listed[one, plate]
     values = {
         "USED": np.array([len(plates)]),
         "TYPE": np.full(len(plates), export.plate_type),
         "ZERO": np.array([1, 0]),
         "CORNERS": np.stack([p.corners.T for p in plates], axis=-1),
         "ORIGIN": np.stack([p.origin for p in plates], axis=-1),
-        "CHANNEL": np.arange(1, count * len(plates) + 1).reshape(-1, count).T,
+        "CHANNEL": listed,
         "CAL_MATRIX": np.stack([p.calibration for p in plates], axis=-1),
     }
     group = content["parameters"]["FORCE_PLATFORM"]
@@ -175,6 +178,7 @@ def _describe(plate: Plate, six: np.ndarray, export: Export, number: int) -> _St
     corners = np.roll(plate.corners_m, export.corner_roll.get(number, 0), axis=0)
     if export.corner_wound:
         corners = corners[::-1]
+    corners = corners + export.plate_rise_m * (export.force_axes @ export.axes[:, 2])
     origin = _origin(plate, export)
     calibration = np.eye(6)
     unit = export.stated_moment_unit

@@ -24,9 +24,10 @@ class Export:
         sensors_exchanged by plate of type 3: which two of eight.
     plate_gains by plate : of all six. late_s : of the forces. of_another : forces of the session's
         next trial. tared : each trial's plates read zero as it begins.
-    plate_order : which plate's readings stand where; corner_roll, corner_wound, doubled,
-        summed : see c3d_export. reference : of the moments: sensor (C3D), surface; in MOT point,
-        plate_centre, lab_origin.
+    plate_rise_m : of the surfaces as stated over the true ones. listed_twice by plate : a channel
+        that also stands where another should. plate_order : which plate's readings stand where;
+        corner_roll, corner_wound, doubled, summed : see c3d_export. reference : of the moments:
+        sensor (C3D), surface; in MOT point, plate_centre, lab_origin.
     """
 
     format: str = "c3d"
@@ -49,6 +50,8 @@ class Export:
     late_s: float = 0.0
     of_another: bool = False
     tared: bool = False
+    plate_rise_m: float = 0.0
+    listed_twice: dict[int, tuple[int, int]] = field(default_factory=dict)
     plate_order: list[int] | None = None
     corner_roll: dict[int, int] = field(default_factory=dict)
     corner_wound: bool = False

@@ -114,6 +114,7 @@ def _columns_of(
         "plate_centre": moment - np.cross(np.broadcast_to(centre, force.shape), force),
         "lab_origin": moment,
     }[export.reference]
+    point = point + export.plate_rise_m * up
     gap = np.nan if export.mot_unloaded == "nan" else 0.0
     force = np.where(loaded[:, None], force, 0.0)
     point, about = (np.where(loaded[:, None], x, gap) for x in (point, about))

@@ -314,6 +314,17 @@ def plate_sum(export: Export, rng: np.random.Generator, plates: int) -> str:
     return "a virtual plate that is the sum of the others"
 
 
+def plates_height(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.plate_rise_m = float(rng.choice([-1, 1]) * rng.uniform(0.2, 0.8))
+    return f"the plates' surface stated {export.plate_rise_m:.2f} m too high"
+
+
+def channel_twice(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate, (one, other) = _one_of(rng, plates), rng.choice(6, 2, replace=False)
+    export.listed_twice = {plate: (int(one), int(other))}
+    return f"{CHANNELS[other]} of plate {plate + 1} listed as the channel of {CHANNELS[one]}"
+
+
 def plate_type(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.plate_type = pick(rng, (1, 3, 4))
     return f"plates of type {export.plate_type}"
@@ -590,6 +601,8 @@ THINGS = (
     Thing("plates", "plates", corners_wound, C3D),
     Thing("plates", "plates", plate_doubled),
     Thing("plates", "plates", plate_sum),
+    Thing(NO_EXPORT, "plates_height", plates_height),
+    Thing(NO_EXPORT, "channels", channel_twice, C3D),
     Thing("plate type", "type", plate_type, C3D),
     Thing("plate type", "moment", calibration_in_Nm, C3D),
     Thing("plate type", "type", sensors_exchanged, C3D),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import ezc3d
 import numpy as np
@@ -308,6 +309,21 @@ def test_plate_that_claims_missing_channels(tmp_path):
     assert recording.plates == ()
     assert recording.forces_note
     assert _levels(recording, "plate") == ["excluded"]
+
+
+@pytest.mark.parametrize(("one", "other"), [((3, 0), (4, 0)), ((2, 1), (2, 0))])
+def test_a_channel_measures_one_thing(tmp_path, one, other):
+    """My listed as Mx; the lift of one plate listed as that of another."""
+    path, spec = tmp_path / "a.c3d", _spec()
+    aside = replace(spec, corners_m=spec.corners_m + np.array([1.0, 0.0, 0.0]))
+    content = ezc3d.c3d(str(write_c3d(path, *standing_markers(N), [spec, aside])))
+    listed = content["parameters"]["FORCE_PLATFORM"]["CHANNEL"]["value"]
+    listed[one] = listed[other]
+    content.write(str(path))
+    left_out = {f.subject: f.found for f in read_recording(path).findings if f.check == "plate"}
+    said = "same numbers" if one[1] == other[1] else "is also listed for plate"
+    assert set(left_out) == {str(k + 1) for k in (one[1], other[1])}
+    assert all(said in found for found in left_out.values())
 
 
 def test_nonsense_corners_drop_the_plate(tmp_path):

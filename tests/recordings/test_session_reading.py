@@ -18,7 +18,7 @@ from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
-from bsip_cli.recordings.under_the_feet import Feet
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Feet
 from tests.recordings.standing_on_two_plates import (
     LABELS,
     corners,
@@ -285,6 +285,34 @@ def test_forces_that_no_reading_brings_under_the_feet_are_refused():
         session = session_reading([TrialSamples.of(trial)])
         assert [f.level for f in findings_about(session)] == ["excluded"] * 2
         assert assemble(trial, session).plates == ()
+
+
+@pytest.mark.parametrize("rise_m", [-1.6, -0.3, 0.2, 1.1])
+def test_a_surface_where_no_foot_can_stand_is_refused(rise_m):
+    """The soles are at 0.04 m; the feet are found wherever the plates are stated."""
+    up = np.array([0.0, 0.0, rise_m])
+    of_corners = [
+        replace(one, description=replace(one.description, corners_m=corners(k) + up))
+        for k, one in enumerate(of_c3d())
+    ]
+    of_points = [replace(one, point_height=rise_m) for one in of_table()]
+    for sources in (of_corners, of_points):
+        session = session_reading([TrialSamples.of(opened(sources))])
+        for verdict in session.plates.values():
+            assert f"its surface lies {abs(0.04 - rise_m):.2f} m" in verdict.refusal
+            assert verdict.after.distance_m < BESIDE_M
+
+
+@pytest.mark.parametrize("rise_m", [-1.6, 1.1])
+def test_a_laboratory_may_lie_anywhere_above_the_cameras_origin(rise_m):
+    up = np.array([0.0, 0.0, rise_m])
+    sources = [
+        replace(one, description=replace(one.description, corners_m=corners(k) + up))
+        for k, one in enumerate(of_c3d())
+    ]
+    samples = TrialSamples.of(opened(sources, motion()[0] + up))
+    assert len(samples.feet.sides) == 6  # heels, toes and ankles, and no pelvis
+    assert session_reading([samples]).refusals() == []
 
 
 @pytest.mark.parametrize("axis", [0, 1])

@@ -101,9 +101,9 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
 @_study
 @_with(*_OF_STUDY, *_VOICE)
 def check(study, chosen, config_file, jobs, **options):
-    """Say what each recording of a study is taken for, and what fails; nothing is kept.
+    """Say what recordings are taken for, if that is a person, and what fails; nothing is kept.
 
-    Exit codes: those of `bsip ingest`.
+    Exit codes: those of `bsip run`.
     """
     from bsip_cli.commands.check import check_study
 

@@ -223,7 +223,7 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     up = unit(neck - waist)
     thorax = np.stack([unit(np.cross(up, right)), up, right], axis=1)
     centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"], "neck": neck}
-    limbs = _Limbs(landmarks, sex, stature_m, centres, {}, {}, notes)
+    limbs = _Limbs(landmarks, sex, stature_m, centres, {}, {}, notes, [])
     for side, sign in (("l", -1.0), ("r", 1.0)):
         across = width * _SCJ * np.array([1.0, 1.0, sign])
         centres[f"sternoclavicular_{side}"] = sternum + thorax @ across
@@ -236,6 +236,9 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
         toes = _mean(landmarks, _toes(side))
         assert toes is not None
         limbs.ends[f"foot_{side}"] = toes
+    if limbs.lateral_only:
+        where = ", ".join(map(in_words, limbs.lateral_only))
+        notes.append(f"lateral markers only: centres from the mean breadth at {where}")
     return JointCentres(centres, axes, limbs.hinges, limbs.ends, tuple(notes))
 
 
@@ -321,6 +324,7 @@ class _Limbs:
     hinges: dict[str, np.ndarray]
     ends: dict[str, np.ndarray]
     notes: list[str]
+    lateral_only: list[str]  # joints
 
     def add_arm(self, side: str, outward: np.ndarray, down: np.ndarray) -> None:
         """What is missing hangs along ``down`` (3,), the trunk's unit vector, or goes on in a
@@ -385,10 +389,7 @@ class _Limbs:
         if medial is not None:
             centre, across = 0.5 * (lateral + medial), lateral - medial
         elif half_m:
-            words = in_words(f"{joint}_{side}")
-            self.notes.append(
-                f"the {words} has a lateral marker only: centre from the mean breadth"
-            )
+            self.lateral_only.append(f"{joint}_{side}")
         self.centres[f"{joint}_{side}"] = centre
         self.hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
 

@@ -1,4 +1,4 @@
-"""What each recording of a study is taken for, and what fails, before anything is computed."""
+"""What each recording of a study is taken for, whether it is a person, and what fails."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ from bsip_cli.study.study import Participant, Trial
 def check_study(
     study: Path, chosen: tuple[str, ...], config_file: Path | None, jobs: int, **voice: bool
 ) -> int:
-    """Read a study's recordings, say what is wrong and what each is; the exit code of `ingest`.
+    """Read a study's recordings and build each person's skeleton, say what is wrong and what each
+    recording is; the exit code of `ingest` and `scale`.
 
     ``voice`` as `follow` takes it.
     """
-    stages = stages_named("ingest")
+    stages = stages_named("ingest") + stages_named("scale")
     with TemporaryDirectory(prefix="bsip-check-") as folder:
         out = Path(folder) / "results"
         opened = open_study(study, out, chosen, config_file)
         running = run_stages(stages, opened.study, out, opened.config, Manner(jobs=jobs))
-        total = sum(1 + len(person.trials) for person in opened.study.participants)
+        total = sum(2 + len(person.trials) for person in opened.study.participants)
         code = follow("check", opened.refusals, running, total, None, **voice)
         for person in opened.study.participants:
             unit = Unit(producer("markers"), opened.study, out, opened.config, person)

@@ -330,8 +330,9 @@ class Comparison:
         if self.is_gross:
             stated = {name: self.stated_kg / size for name, size in FORCE_UNITS_N.items()}
             units = (_IN_UNIT.format(name) for name, kg in stated.items() if self._meets(kg))
-            nothing_known = "a typing mistake, another person's row, a second person or a load on "
-            remark = f"; {self.likely() or next(units, f'{nothing_known}the plates')}"
+            nothing_known = "a typing mistake, another person's row, plates of another gain, or a "
+            nothing_known += "second person or a load on them"
+            remark = f"; {self.likely() or next(units, nothing_known)}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
             f"the plates measure {self.measured.words()}{remark}"

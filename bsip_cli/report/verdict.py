@@ -168,6 +168,8 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
         return " even with identified parameters"
     if most is None:
         return f", {CAUSE_UNKNOWN}"
+    if most.share >= 100.0:  # what another part takes off again is beyond the whole
+        return f", all of it {most.label}"
     how = "most" if most.share > 50.0 else "the largest part"
     return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 

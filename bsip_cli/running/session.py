@@ -181,13 +181,18 @@ def follow(
 @dataclass
 class _Voice:
     """What the user hears; a remark that many recordings get is made once, and at the end it is
-    said of which others it is true."""
+    said of which others it is true, and from which stages a refusal kept whom."""
 
     verbose: bool
     quiet: bool
     said: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    kept_from: dict[str, list[str]] = field(default_factory=dict)  # by person
 
     def report(self, outcome: Outcome) -> None:
+        if outcome.state == "waiting" and not outcome.exit_code:
+            stages = self.kept_from.setdefault(outcome.unit.split("_")[0], [])
+            stages += [outcome.stage] if outcome.stage not in stages else []
+            return
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
             general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
@@ -205,6 +210,12 @@ class _Voice:
             if len(units) > 1:
                 others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
                 tqdm.write(f"{stage}: {others}", file=sys.stderr)
+        kept: dict[str, list[str]] = {}
+        for name, stages in self.kept_from.items():
+            kept.setdefault(", ".join(stages), []).append(name)
+        for which, names in kept.items():
+            said = f"{listed(names)}: left out of {which}, since an input was refused"
+            tqdm.write(said, file=sys.stderr)
 
 
 def _say(outcome: Outcome, sentence: str) -> None:

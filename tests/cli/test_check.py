@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import ezc3d
 import pytest
 
 from tests.fuzz.fuzz_study import _write_trc_mot
@@ -39,8 +40,22 @@ def test_says_what_each_recording_is(bsip, study):
     squat, static, empty = lines
     assert "50 Hz, 38 markers (hansen2017), 1 plate, every contact measured for 3.4 s" in squat
     assert " static " in static and "refused" in empty
-    assert "sub-01_task-steps.c3d" in answer.err and answer.summary.startswith("bsip check: 3 done")
+    assert "sub-01_task-steps.c3d" in answer.err and answer.summary.startswith("bsip check: 4 done")
     assert sorted(study.rglob("*")) == before
+
+
+def test_no_person_is_said_before_anything_is_computed(bsip, study):
+    """Knee and ankle exchanged in all recordings: each is read well."""
+    (study / "sub-01" / "sub-01_task-steps.c3d").unlink()
+    for path in (study / "sub-01").glob("*.c3d"):
+        content = ezc3d.c3d(str(path))
+        labels = content["parameters"]["POINT"]["LABELS"]["value"]
+        one, other = labels.index("RKNEL"), labels.index("RMALL")
+        labels[one], labels[other] = labels[other], labels[one]
+        content.write(str(path))
+    answer = bsip("check", study)
+    assert answer.code == 3 and answer.summary == "bsip check: 3 done, 1 refused"
+    assert "scale: sub-01: is this a person? the right shank is " in answer.err
 
 
 def test_a_study_that_is_none(bsip, tmp_path):

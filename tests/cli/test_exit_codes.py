@@ -181,4 +181,6 @@ def test_everybody_refused(bsip, empty_study, tmp_path):
         "sub-01_readings.parquet",
         "sub-02_readings.parquet",
     }
-    assert "sub-01: left out of scale, since its input was refused" in answer.err
+    lines = [line for line in answer.err.splitlines() if "left out of" in line]
+    assert [line.split(":")[0] for line in lines] == ["sub-01, sub-02", "group"]
+    assert "left out of scale, ik, regress, " in lines[0] and "an input was refused" in lines[0]

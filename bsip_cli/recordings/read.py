@@ -254,7 +254,7 @@ def _not_its_own(recording: Recording, session: SessionReading) -> str:
         )
     if session.odd.get(name) == "forces":
         return (
-            "as the forces of all other trials of the session are understood, they carry and drive "
+            "as the forces of the other trials of the session are understood, they carry and drive "
             "the body; this trial's do not, and nothing makes one person of both; look whether "
             "they are this trial's, and exported as the others are"
         )

@@ -131,8 +131,8 @@ def reading_of_files(
 ) -> SessionReading:
     """`session_reading` of trials as their files say, or ``read`` otherwise: with forces of another
     unit than N, or of markers or forces of another rate than the stated one. Trials that have each
-    other's forces tell nothing, nor does one that is not as all others are: left and right are
-    exchanged in it, or without it, its forces make a person.
+    other's forces tell nothing, nor do the few that are not as the others are: left and right are
+    exchanged in them, or without them the forces make a person.
 
     stated_kg, stated_m : of the person. gross_percent : by how much a mass may differ from it.
     """
@@ -149,8 +149,8 @@ def reading_of_files(
 
     stated = stated_kg, stated_m, gross_percent, limits
     found = _reading_of_own(of_own_forces, *stated)
-    if name := _odd_trial(of_own_forces(found.written), found, limits):
-        odd[name] = "forces"
+    if names := _odd_trials(of_own_forces(found.written), found, limits):
+        odd |= dict.fromkeys(names, "forces")
         found = _reading_of_own(of_own_forces, *stated)
     return replace(found, of_others=of_others, twins=twins, odd=odd)
 
@@ -184,21 +184,28 @@ def _height_m(trials: Sequence[TrialSamples], stated_m: float | None) -> float |
     return stated_m or (None if usual is None else usual.height_m)
 
 
-def _odd_trial(trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits) -> str:
-    """The one trial without which forces that are no person's as ``found`` are one's; empty if
-    there is none, or if it may be one or another."""
+def _odd_trials(
+    trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits
+) -> list[str]:
+    """The few trials without which forces that are no person's as ``found`` are one's: those that
+    are nobody's even alone, or fewer than half that alone are understood alike and otherwise than
+    the others; none if it may be these or those."""
     if not found.is_refused:
-        return ""
+        return []
     some = [k for k, one in enumerate(trials) if one.sources]
     alone = {k: session_reading([trials[k]], limits) for k in some}
     own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
     refused = [k for k, one in alone.items() if one.is_refused]
-    may_be = refused or [k for k in some if list(own.values()).count(own[k]) == 1]
-    if len(refused) > 1 or len(some) < 2:
-        return ""
-    rest = {k: [*trials[:k], *trials[k + 1 :]] for k in may_be}
-    clear = [k for k, others in rest.items() if not session_reading(others, limits).refusals()]
-    return trials[clear[0]].name if len(clear) == 1 else ""
+    alike = [[k for k in some if own[k] == own[first]] for first in some]
+    few = [list(one) for one in dict.fromkeys(map(tuple, alike)) if 2 * len(one) < len(some)]
+    may_be = [refused] if refused else few
+    rest = [[one for k, one in enumerate(trials) if k not in gone] for gone in may_be]
+    clear = [
+        gone
+        for gone, others in zip(may_be, rest, strict=True)
+        if any(one.sources for one in others) and not session_reading(others, limits).refusals()
+    ]
+    return [trials[k].name for k in clear[0]] if len(clear) == 1 else []
 
 
 def _reading_of_own(

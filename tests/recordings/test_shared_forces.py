@@ -95,15 +95,29 @@ def exchanged(sources):
     ]
 
 
-def test_one_trial_with_exchanged_plates_costs_the_others_nothing():
-    trials = [named(opened(of_c3d()), f"t{k}") for k in range(2)]
-    trials.append(named(opened(exchanged(of_c3d())), "odd"))
+def far_away() -> Opened:
+    """Nobody stands on the plates."""
+    return opened(of_c3d(), motion()[0] + np.array([3.0, -2.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("sound", "odd"),
+    [
+        (2, [opened(exchanged(of_c3d()))]),
+        (3, [opened(exchanged(of_c3d()))] * 2),
+        (1, [far_away()]),
+        (2, [far_away()] * 2),
+    ],
+)
+def test_few_trials_that_are_otherwise_cost_the_others_nothing(sound, odd):
+    trials = [named(opened(of_c3d()), f"t{k}") for k in range(sound)]
+    trials += [named(one, f"odd{k}") for k, one in enumerate(odd)]
     found = reading(trials)
-    assert found.odd == {"odd": "forces"} and not found.refusals()
+    assert found.odd == {f"odd{k}": "forces" for k in range(len(odd))} and not found.refusals()
     assert all(one.reading == AS_STATED for one in found.plates.values())
     assert assemble(trials[0], found).plates
     without = assemble(trials[-1], found)
-    assert not without.plates and "all other trials" in without.forces_note
+    assert not without.plates and "the other trials" in without.forces_note
 
 
 def test_which_of_two_is_odd_is_not_known():

@@ -30,6 +30,7 @@ from bsip_cli.recordings.plates_of_files import ForceOnPoint
 from bsip_cli.recordings.shared_forces import ALIKE_M
 from bsip_cli.recordings.trial_samples import TrialSamples, pace, paces
 from bsip_cli.recordings.under_the_feet import (
+    PASSES_M,
     Evidence,
     Feet,
     evidence,
@@ -55,7 +56,7 @@ class PlateTrial:
     """A plate in one trial: ``source`` at the samples in which it is loaded, with its parts (n, k)
     there and, averaged, at all samples of the trial, ``smooth`` (m, k); ``apart`` (n,) where one
     other plate is loaded too: two feet, two plates; ``body_m`` (n, 3) the centre of mass,
-    NaN where that is but for a moment."""
+    NaN where that is but for a moment; ``passes`` (n,) where it goes over this plate alone."""
 
     trial: int
     source: PlateSource
@@ -65,6 +66,7 @@ class PlateTrial:
     apart: np.ndarray
     corners_m: np.ndarray | None
     body_m: np.ndarray
+    passes: np.ndarray
 
     @classmethod
     def of(cls, trial: int, samples: TrialSamples, name: str, place: str) -> PlateTrial:
@@ -77,12 +79,17 @@ class PlateTrial:
         source, corners = source.at(loaded), source.plate(AS_STATED).corners_m
         feet = samples.feet.at(loaded).on(corners)
         others = [samples.loaded[other][loaded] for other in samples.sources if other != name]
-        apart = np.sum(others, axis=0, initial=0) == 1 if others else np.zeros(len(loaded), bool)
+        besides = np.sum(others, axis=0) if others else np.zeros(len(loaded), int)
+        apart, alone = besides == 1, besides == 0
         smooth_parts = np.nan_to_num(smooth.parts())
         body = samples.body.place_m[loaded].copy()
+        way = body[alone & np.isfinite(body).all(axis=1), :2]
+        goes = len(way) > 0 and float(np.linalg.norm(np.ptp(way, axis=0))) > PASSES_M
         if samples.body.lasts_s[loaded][apart].sum() < INDEPENDENT_S:
             body[:] = np.nan
-        return cls(trial, source, source.parts(), smooth_parts, feet, apart, corners, body)
+        return cls(
+            trial, source, source.parts(), smooth_parts, feet, apart, corners, body, alone & goes
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +97,7 @@ class PlateFit:
     """A reading, with its sign and its fixed point, and how well it makes forces under feet.
 
     For each of n trials that have the plate: from the parts to the wrench, ``matrices`` (6, k), and
-    what it shows, ``found`` (n, 9), with its logarithmic likelihood, of all trials together; that
+    what it shows, ``found`` (n, 10), with its logarithmic likelihood, of all trials together; that
     of its sensors is ``of_sensors``.
     """
 
@@ -155,7 +162,8 @@ def _evidence(one: PlateTrial, readings: Sequence[PlateReading], wrench: np.ndar
         both = one.parts @ np.array(levels).transpose(1, 0, 3, 2)  # (2, r, n, 2)
         level_Nm = tuple(np.linalg.norm(both, axis=-1))
     lever = None if levers[0] is None else np.array(levers)
-    return evidence(wrench, floors, one.feet, one.apart, one.corners_m, lever, level_Nm, one.body_m)
+    where = one.feet, one.apart, one.corners_m, lever, level_Nm, one.body_m, one.passes
+    return evidence(wrench, floors, *where)
 
 
 def _centred(reading: PlateReading, seen: Sequence[PlateTrial]) -> PlateReading:

@@ -28,7 +28,13 @@ from bsip_cli.recordings.plate_reading import (
 from bsip_cli.recordings.scene import Handedness, Stature
 from bsip_cli.recordings.shared_forces import Course, of_twins
 from bsip_cli.recordings.trial_samples import TrialSamples, log_odds_of, surest
-from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, is_on_surface, outline
+from bsip_cli.recordings.under_the_feet import (
+    BESIDE_M,
+    STAYS_M,
+    Evidence,
+    is_on_surface,
+    outline,
+)
 from bsip_cli.recordings.written import (
     AS_WRITTEN,
     Written,
@@ -187,15 +193,17 @@ def _height_m(trials: Sequence[TrialSamples], stated_m: float | None) -> float |
 def _odd_trials(
     trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits
 ) -> list[str]:
-    """The few trials without which forces that are no person's as ``found`` are one's: those that
-    are nobody's even alone, or fewer than half that alone are understood alike and otherwise than
-    the others; none if it may be these or those."""
+    """The few trials without which forces that are no person's as ``found`` are one's: half of them
+    at most, which are nobody's even alone, or fewer, which alone are understood alike and otherwise
+    than the others; none if it may be these or those."""
     if not found.is_refused:
         return []
     some = [k for k, one in enumerate(trials) if one.sources]
     alone = {k: session_reading([trials[k]], limits) for k in some}
     own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
     refused = [k for k, one in alone.items() if one.is_refused]
+    if 2 * len(refused) > len(some):
+        return []
     alike = [[k for k in some if own[k] == own[first]] for first in some]
     few = [list(one) for one in dict.fromkeys(map(tuple, alike)) if 2 * len(one) < len(some)]
     may_be = [refused] if refused else few
@@ -391,6 +399,11 @@ def _fault(found: Evidence) -> str:
         return f"its centre of pressure lies {found.distance_m:.2f} m beside the feet on the ground"
     if not np.isfinite(found.distance_m) and found.outside_m > BESIDE_M:
         return f"its centre of pressure lies {found.outside_m:.2f} m outside the plate"
+    if found.rolls_m < STAYS_M:
+        spread = (
+            f"its centre of pressure spreads by {1e3 * found.rolls_m:.1f} mm only while the body"
+        )
+        return f"{spread} passes over it, as if its moments were too small"
     if np.isfinite(found.above_m) and not is_on_surface(found.above_m):
         way = "below" if found.above_m > 0 else "above"
         return f"its surface lies {abs(found.above_m):.2f} m {way} the foot's lowest marker on it"

@@ -6,6 +6,8 @@ The scales are those of 130 sound plates of 40 public recordings: the centre of 
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
 the vertical moment over the force is 3 mm, in golf swings 60, in one quiet stance 0.024 at least;
 the lowest marker of a foot is 0 to 102 mm above the surface, a computed one 46 mm below it.
+Whoever passes over a plate rolls over the foot: where the body goes by 0.3 m or more, the centre of
+pressure spreads by 20 to 97 mm (65 plates; a runner's forefoot 24 to 34).
 
 A leg can turn little about its hip, so that the force under a foot leans from its centre of
 pressure towards the body: of the slope to the centre of mass it has 0.63 in the median over 66
@@ -25,6 +27,11 @@ from bsip_cli.recordings.plates import cop_at_height
 
 BESIDE_M = 0.12
 """Half a foot's length: a centre of pressure so far beside the feet is not under them."""
+
+STAYS_M = 0.01
+"""Half of the least spread of a centre of pressure over which a body passes, see above."""
+
+PASSES_M = 0.3
 
 LOWEST_M = (-0.06, 0.17)
 """Where, over the surface, a foot's lowest marker is: computed ones err, some sets have ankles."""
@@ -138,17 +145,19 @@ class Evidence:
     """What a reading makes of a plate's numbers [m]; NaN where it cannot be known.
 
     distance_m : of the centre of pressure from the feet, mean; outside_m : from the outline, mean;
-    above_m : the lowest marker of a foot above the surface, median;
-    sway_m : its standard deviation; lever_m : its distance from the sensor as the moments have it;
-    torque_m, level_m : vertical and horizontal moment at it over the force, median; level_share :
-    of the horizontal moment as written, what a reading leaves [1]; astray : how far the force under
-    one foot of two is from leaning towards the body, over the slope to its centre of mass [1].
+    above_m : the lowest marker of a foot above the surface, median; sway_m : the standard deviation
+    of the place, and rolls_m where a body passes; lever_m : its distance from the sensor as the
+    moments have it; torque_m, level_m : vertical and horizontal moment at it over the force,
+    median; level_share : of the horizontal moment as written, what a reading leaves [1]; astray :
+    how far the force under one foot of two is from leaning towards the body, over the slope to its
+    centre of mass [1].
     """
 
     distance_m: float
     outside_m: float
     above_m: float
     sway_m: float
+    rolls_m: float
     lever_m: float
     torque_m: float
     level_m: float
@@ -168,14 +177,16 @@ def evidence(
     lever_m: np.ndarray | None,
     level_Nm: tuple[np.ndarray, np.ndarray] | None,
     body_m: np.ndarray,
+    passes: np.ndarray,
 ) -> np.ndarray:
-    """What each of r readings makes of n loaded samples, (r, 9): columns as in `Evidence`.
+    """What each of r readings makes of n loaded samples, (r, 10): columns as in `Evidence`.
 
     wrench : (r, n, 6), about the world's origin. floor_m : (r,). feet : on the plate's place.
     apart : (n,), where each foot stands on a plate of its own.
     lever_m : (r, n), from the sensor to where its moments have the force; None without a sensor.
     level_Nm : horizontal moment (r, n) at the points that the file calls centres of pressure, as
     read and as written; None without such points. body_m : the centre of mass (n, 3).
+    passes : (n,), where a body goes over the plate, which bears it alone.
     """
     force, moment = wrench[..., :3], wrench[..., 3:]
     load = np.maximum(np.abs(force[..., 2]), _NO_LOAD_N)
@@ -194,24 +205,27 @@ def evidence(
     if np.isfinite(above).any():
         table[2] = np.nanmedian(above, axis=1)
     table[3] = _spread(cop)
+    if passes[known].any():
+        table[4] = _spread(cop[:, passes[known]])
     if lever_m is not None:
-        table[4] = np.sqrt(_mean(lever_m[:, known] ** 2))
-    table[5] = np.median(np.abs(torque) / load, axis=1)
-    table[5][table[5] == 0.0] = np.nan  # none is written
+        table[5] = np.sqrt(_mean(lever_m[:, known] ** 2))
+    table[6] = np.median(np.abs(torque) / load, axis=1)
+    table[6][table[6] == 0.0] = np.nan  # none is written
     if level_Nm is not None:
         read, written = (x[:, known] for x in level_Nm)
-        table[6], table[7] = np.median(read / load, axis=1), _left_share(read, written, load)
-    table[8] = _astray(force, cop, floor_m, body_m[known], apart[known])
+        table[7], table[8] = np.median(read / load, axis=1), _left_share(read, written, load)
+    table[9] = _astray(force, cop, floor_m, body_m[known], apart[known])
     return table.T
 
 
 def log_likelihood(found: np.ndarray) -> np.ndarray:
-    """Up to a constant: how likely a person's foot makes such numbers (..., 9), logarithm."""
-    distance, outside, _, _, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
+    """Up to a constant: how likely a person's foot makes such numbers (..., 10), logarithm."""
+    distance, outside, _, _, rolls, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
     terms = [
         falling(distance, _DISTANCE_M),
         np.clip(falling(outside, _DISTANCE_M), _RARE, 0.0),
         lever_log_likelihood(found),
+        falling(STAYS_M, rolls),
         falling(torque, _TORQUE_M),
         np.maximum(falling(_LITTLE_TORQUE_M, torque), _RARE),
         falling(level, _LEVEL_M),
@@ -224,11 +238,11 @@ def log_likelihood(found: np.ndarray) -> np.ndarray:
 def lever_log_likelihood(found: np.ndarray) -> np.ndarray:
     """The part of how the moments go with a lever about the sensor: it distinguishes readings, and
     no person from nobody, since a file may give moments about its own origin."""
-    return np.nan_to_num(2.0 * np.log(np.clip(found[..., 4] / _LEVER_M, _LEAST, 1.0)))
+    return np.nan_to_num(2.0 * np.log(np.clip(found[..., 5] / _LEVER_M, _LEAST, 1.0)))
 
 
 def mean_evidence(found: np.ndarray) -> Evidence:
-    """Over several trials (n, 9), of what is known in them."""
+    """Over several trials (n, 10), of what is known in them."""
     return Evidence(*_mean(found.T).tolist())
 
 

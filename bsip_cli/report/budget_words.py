@@ -14,7 +14,7 @@ from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import TEXTS, component_label, findings, listing, number, signed
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
-BEFORE = "squared error before identification"  # RM's, of which the budget is
+BEFORE = "squared error with RM"  # RM's, of which the budget is
 REST = "small parts"
 PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"

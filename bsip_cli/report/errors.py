@@ -176,7 +176,8 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = (
-    "Good to the first mark (Hansen 2017), bad from the second (Hicks 2015; markers: OpenSim)."
+    "RMS, measured less computed: good to the first mark (Hansen 2017), bad from the second "
+    "(Hicks 2015; markers: OpenSim)."
 )
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0

@@ -263,7 +263,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
                 replace(one, label=one.label.replace(budget_words.PARAMETERS, known))
                 for one in pieces
             )
-        before = " before identification" if use != RM else ""
+        before = " with RM" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 
 

@@ -222,7 +222,7 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
                 because.setdefault(use.brief or use.why, []).append(stem)
         if len(because) > _MOST_REASONS:
             stems = [stem for of in because.values() for stem in of]
-            because = {"each for the reason below": stems}
+            because = {"reasons below, under What was recorded": stems}
         parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
         if parts:
             yield f"{words['long']}: {'; '.join(parts)}."

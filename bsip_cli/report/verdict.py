@@ -165,7 +165,7 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
     Errors with identified parameters are not the table's."""
     most, is_left = main_part(budget, found, use)
     if is_left:
-        return " even with identified parameters"
+        return " even with OM"
     if most is None:
         return f", {CAUSE_UNKNOWN}"
     if most.share >= 100.0:  # what another part takes off again is beyond the whole

@@ -140,15 +140,12 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
     assert "the errors? ● RM, ○ OM (basketball: RM) (not to be used yet)" in first
-    assert (
-        "What makes the squared error of forces (not of joint moments) before identification:"
-        in first
-    )
+    assert "What makes the squared error of forces (not of joint moments) with RM:" in first
     assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
     corrected = "sequence (finding 1); basketball (findings 1 and"
-    assert f"Use after correcting, or stating the load: {corrected}" in first
+    assert f"Use after acting on the finding: {corrected}" in first
     assert (
         "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
         "another (study.toml: roles); run again. Then use RM for basketball, where OM is not "
@@ -239,7 +236,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     )
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
-    assert (light.state, light.title) == ("large", "Large error even with identified parameters")
+    assert (light.state, light.title) == ("large", "Large error even with OM")
     (finding,) = large_finding(large)
     assert finding.startswith(
         "Large error with OM (basketball: RM): vertical force 5.5 %, most in sequence; cause "

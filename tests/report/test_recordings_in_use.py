@@ -129,7 +129,7 @@ def test_what_quiet_stance_shows_concerns_all(record):
     weight = fault("plate_gain", STATIC, class_id="W", verdict="ambiguous")
     assert kinds_of(with_faults(record, weight)) == ["corrected"] * 3
     said = list(use_lines(with_faults(record, weight)))
-    assert said == ["Use after correcting, or stating the load: all recordings (finding 1)."]
+    assert said == ["Use after acting on the finding: all recordings (finding 1)."]
 
 
 def test_without_a_diagnosis_nothing_is_said_of_the_recordings(record):
@@ -147,7 +147,7 @@ def test_runs_are_counted_where_they_are_many(record):
     )
     assert list(use_lines(many)) == [
         "Use (motion, forces, joint moments): sequence, basketball and 5 × walking.",
-        "Use after correcting, or stating the load: static (finding 1).",
+        "Use after acting on the finding: static (finding 1).",
     ]
     two = replace(many, trials=many.trials[:5])
     assert "basketball, walking run 1 and walking run 2." in next(iter(use_lines(two)))

@@ -67,11 +67,9 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     assert "sub-01: No fault found" in "\n".join(shown(tmp_path))  # no report, no yardstick
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert said.startswith(
-        "sub-01: Large error even with identified parameters. Large with OM (identified): vertical"
-    )
+    assert said.startswith("sub-01: Large error even with OM. Large with OM (identified): vertical")
     page = replace(reports, out=tmp_path).html("sub-01")
-    assert "<strong>Large error even with identified parameters</strong>" in page
+    assert "<strong>Large error even with OM</strong>" in page
 
 
 def test_of_several_people_each_has_a_line(reports):

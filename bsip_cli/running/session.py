@@ -214,7 +214,7 @@ class _Voice:
         for name, stages in self.kept_from.items():
             kept.setdefault(", ".join(stages), []).append(name)
         for which, names in kept.items():
-            said = f"{listed(names)}: left out of {which}, since an input was refused"
+            said = f"{listed(sorted(names))}: left out of {which}, since an input was refused"
             tqdm.write(said, file=sys.stderr)
 
 

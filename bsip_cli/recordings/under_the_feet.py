@@ -225,7 +225,7 @@ def log_likelihood(found: np.ndarray) -> np.ndarray:
         falling(distance, _DISTANCE_M),
         np.clip(falling(outside, _DISTANCE_M), _RARE, 0.0),
         lever_log_likelihood(found),
-        falling(STAYS_M, rolls),
+        falling(STAYS_M, np.maximum(rolls, _HAIR_M)),
         falling(torque, _TORQUE_M),
         np.maximum(falling(_LITTLE_TORQUE_M, torque), _RARE),
         falling(level, _LEVEL_M),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import (
     INDEPENDENT_S,
@@ -20,6 +21,7 @@ from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     EXCHANGED,
     ONE_ALONE,
+    OTHER_GAIN,
     REVERSED,
     FrameChange,
     PlateReading,
@@ -45,6 +47,8 @@ AS_IT_IS = "taken as they stand"
 # by less than this part of the load, and their vertical moments by less than this times it.
 _ALIKE_SHARE, _ALIKE_TORQUE_M = 0.01, 0.003
 _CLEARLY, _IN_19_OF_20 = 3.0, 1.96  # standard deviations
+# Of one plate, that masses do not show for sure: steps of an eighth.
+_GAINS = np.geomspace(0.4, 2.5, 16)
 _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 
 
@@ -224,20 +228,20 @@ class Hypothesis:
     def balance(self) -> Balance:
         return Balance.of(self.body, self._total(), self.limits)
 
-    def _total(self) -> np.ndarray:
-        """All plates' wrench at the samples of all trials, (n, 6)."""
-        return np.concatenate(self._totals())
+    def _total(self, names: Collection[str] = ()) -> np.ndarray:
+        """The wrench of all plates, or of some, at the samples of all trials, (n, 6)."""
+        return np.concatenate(self._totals(names or self.fits))
 
-    def _totals(self) -> list[np.ndarray]:
+    def _totals(self, names: Collection[str]) -> list[np.ndarray]:
         total = [np.zeros((len(trial.body.trial), 6)) for trial in self.trials]
-        for fit in self.fits.values():
-            for k, wrench in fit.wrenches(smooth=True).items():
+        for name in names:
+            for k, wrench in self.fits[name].wrenches(smooth=True).items():
                 total[k] += wrench
         return total
 
     @cached_property
     def of_paces(self) -> dict[str, np.ndarray]:
-        totals = zip(self.trials, self._totals(), strict=True)
+        totals = zip(self.trials, self._totals(self.fits), strict=True)
         return {trial.name: paces(trial.body, total, self.limits) for trial, total in totals}
 
     def paces(self, percent: float) -> dict[str, float]:
@@ -251,8 +255,25 @@ class Hypothesis:
     @cached_property
     def log_posterior(self) -> float:
         """But for a constant."""
-        on_feet = sum(fit.log_likelihood for fit in self.fits.values())
-        return self._log_prior() + on_feet + self.balance.log_likelihood(self.limits)
+        return self._log_on_feet() + self.balance.log_likelihood(self.limits)
+
+    def _log_on_feet(self) -> float:
+        return self._log_prior() + sum(fit.log_likelihood for fit in self.fits.values())
+
+    def log_posterior_of_gains(self) -> float:
+        """The same where besides one plate of several may have another gain, which moves no centre
+        of pressure and which no reading mends."""
+        if len(self.fits) == 1:
+            return self.log_posterior
+        total = self._total()
+        gained = [
+            Balance.of(self.body, total + (gain - 1.0) * own, self.limits)
+            for own in map(self._total, ([name] for name in self.fits))
+            for gain in _GAINS
+        ]
+        logs = [one.log_likelihood(self.limits) for one in gained]
+        some = float(logsumexp(logs) - np.log(len(_GAINS)))
+        return float(np.logaddexp(self.log_posterior, self._log_on_feet() + OTHER_GAIN + some))
 
     def _log_prior(self) -> float:
         """How rare it is that so much is wrong at once, logarithm; what is wrong with several

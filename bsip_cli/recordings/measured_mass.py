@@ -127,6 +127,15 @@ def measured_mass(
     return replace(measured, remark=f" ({differ}: the static trial counts)")
 
 
+def least_mass(intervals: Sequence[Interval], most_percent: float) -> MeasuredMass:
+    """Of intervals that do not agree: what bears a person beside the plates takes weight off them,
+    so that the lowest is the least that is on them. most_percent : as for `measured_mass`."""
+    if not intervals:
+        return unknown("there is no interval")
+    lowest = min(intervals, key=lambda one: one.mass_kg)
+    return replace(_judged([[lowest]], most_percent, None), remark=", or more")
+
+
 def _too_little(intervals: Sequence[Interval], agreeing: Sequence[Interval]) -> str:
     """Why a trial shows nothing; empty if it does."""
     if not intervals:

@@ -31,6 +31,7 @@ _TWO_OF_SENSORS = -float(np.log(28))  # which of eight, nothing says beforehand
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
+OTHER_GAIN = _MOMENTS_REVERSED + ONE_ALONE  # of one plate, as rare as another fault of its numbers
 
 _ODD = -2.3  # of ten frames that are turned one is so by no multiple of 90 degrees
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten

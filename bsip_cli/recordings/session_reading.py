@@ -351,6 +351,8 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
     logs = np.array([one.log_posterior for one in tried])
     leans = sum(np.isfinite(fit.found[:, -1]).sum() for fit in now.fits.values())
     seen = leans + sum(1 + len(trial.sources) for trial in now.trials)
+    for k in np.flatnonzero(logs > logs.max() + _LEAST_LIKELY).tolist():
+        logs[k] = tried[k].log_posterior_of_gains()
     best = tried[int(np.argmax(logs))]
     # A fault that no reading mends; that the file's moments have no lever is none.
     nobody = sum(fit.log_likelihood_of_nobody() for fit in now.fits.values())

@@ -23,7 +23,12 @@ from bsip_cli.recordings.contacts import (
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
-from bsip_cli.recordings.measured_mass import differing_plates, mass_finding, measured_mass
+from bsip_cli.recordings.measured_mass import (
+    differing_plates,
+    least_mass,
+    mass_finding,
+    measured_mass,
+)
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.read import assemble, findings_about
@@ -156,6 +161,10 @@ def _mass_on_plates(
     measured = measured_mass({unit.name: intervals}, options.mass_half_width_percent, height_m)
     if stated is not None and not measured.is_known:
         measured = measured_mass({unit.name: intervals}, VAGUE_PERCENT)
+        least = least_mass(intervals, VAGUE_PERCENT)
+        more = compared(unit, stated, least, unit.load_kg())
+        if not measured.is_known and more and more.is_gross and more.difference_percent > 0:
+            measured = least
     comparison = compared(unit, stated, measured, unit.load_kg())
     about = [mass_finding(measured, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)

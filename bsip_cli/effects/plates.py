@@ -177,7 +177,7 @@ class PlateGain(OfPlates):
 
     name = "plate_gain"
     # A quarter of 0.04 is not reported: plates of one lab differ by some tenths of a percent.
-    numbers = (Parameter("gain", "1", -0.15, 0.15, 0.04),)
+    numbers = (Parameter("gain", "1", -0.6, 1.5, 0.04),)  # an amplifier at another range
     channels = CHANNELS[:3]
     looks = (
         "forces of one plate or channel are too large or too small in proportion; in "

@@ -8,7 +8,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import accumulate, chain, pairwise
 
 from bsip_cli.config import shipped
@@ -96,6 +96,11 @@ def meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     plainest has it, the others track; three or more that differ by a number are a cluster and only
     track.
     """
+    return dict(_of_everybody(tuple(labels)))
+
+
+@lru_cache(maxsize=32)  # the trials of a person have the same labels, and all ask for them
+def _of_everybody(labels: tuple[str, ...]) -> dict[str, Meaning]:
     known = affixes(labels, bones)
     owned = {label: owner(label, known) for label in labels}
     bare = {label: a.off(label.strip()) if a else split(label)[1] for label, a in owned.items()}

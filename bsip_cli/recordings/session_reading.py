@@ -351,8 +351,9 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
     logs = np.array([one.log_posterior for one in tried])
     leans = sum(np.isfinite(fit.found[:, -1]).sum() for fit in now.fits.values())
     seen = leans + sum(1 + len(trial.sources) for trial in now.trials)
-    for k in np.flatnonzero(logs > logs.max() + _LEAST_LIKELY).tolist():
-        logs[k] = tried[k].log_posterior_of_gains()
+    likeliest = int(np.argmax(logs))
+    if likeliest:  # a gain makes other repairs look likely
+        logs[[0, likeliest]] = [tried[k].log_posterior_of_gains() for k in (0, likeliest)]
     best = tried[int(np.argmax(logs))]
     # A fault that no reading mends; that the file's moments have no lever is none.
     nobody = sum(fit.log_likelihood_of_nobody() for fit in now.fits.values())

@@ -23,6 +23,8 @@ sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
 	$(BIN)/bsip show out/sample
 
+# What the tests' many processes of bsip have in common is compiled once.
+unexport PYTHONDONTWRITEBYTECODE
 PYTEST = $(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 test: check

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bsip_cli.recordings.measured_mass import (
     differing_plates,
+    least_mass,
     mass_finding,
     measured_mass,
     plate_gains,
 )
-from tests.mass.body import told
+from tests.mass.body import rise, told
 
 
 def test_more_intervals_show_more():
@@ -37,6 +39,16 @@ def test_trials_that_disagree_show_nothing_but_for_a_static_one(other_kg):
 def test_a_trial_that_shows_nothing_does_not_spoil_the_others():
     found = measured_mass({"sitting": told(62.0, ahead_m=0.8), "standing": told(62.0)}, 10.0)
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
+
+
+def test_what_bears_now_and_then_leaves_the_least_mass():
+    borne_N = np.where(np.arange(len(rise(8.0, 0.05)[1])) % 90 < 30, 150.0, 0.0)
+    intervals = told(100.0, 8.0, 0.05, borne_N)
+    assert not measured_mass({"squat": intervals}, 50.0).is_known
+    least = least_mass(intervals, 50.0)
+    assert 80.0 < least.mass_kg <= min(one.mass_kg for one in intervals)
+    assert least.words().endswith(", or more")
+    assert not least_mass((), 50.0).is_known
 
 
 @pytest.mark.parametrize(

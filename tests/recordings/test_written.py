@@ -162,8 +162,9 @@ def test_measured_forces_in_another_unit(real_data, tmp_path, unit, newton):
     assert unit in said.action
 
 
-@pytest.mark.parametrize("times", [0.5, 0.8, 1.25, 2.0])
-@pytest.mark.parametrize("whose", ["times", "of_forces"])
+@pytest.mark.parametrize(
+    ("whose", "times"), [("times", 0.8), ("times", 2.0), ("of_forces", 0.5), ("of_forces", 1.25)]
+)
 def test_measured_times_of_either_file_that_are_wrong_by_a_factor(
     real_data, tmp_path, whose, times
 ):

@@ -19,7 +19,7 @@ from tests.blind.blind_scoring import (
 from tests.blind.blind_tables import document, scores_frame
 
 SEED = 7
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(minutes=45)  # once, for all of them
 
 # What the suite forgives, of 25 effects hidden alone, 4 in pairs, 2 outside the catalogue.
 MISSES_ALLOWED = 5

@@ -45,7 +45,7 @@ def test_every_circumstance_has_an_outcome_and_a_wrong_one_says_what(few):
     assert all(j.wrong for j in few if j.outcome == WRONGLY_REPAIRED)
 
 
-@pytest.mark.long
+@pytest.mark.long(minutes=20)
 def test_fifty_circumstances_keep_the_limits():
     judgements = examined(SEED, range(50), jobs=2)
     changed = [j for j in judgements if "sound" not in j.kinds]

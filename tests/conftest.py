@@ -16,9 +16,9 @@ _begun: set[str] = set()  # files whose mark says how long they take as a whole
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """END : seconds since 1970, as `.ci/run` sets it; without it nothing is skipped."""
     end, mark = float(os.environ.get(END, "inf")), item.get_closest_marker("long")
-    if mark is None or item.path.name in _begun:
+    if mark is None or str(item.path) in _begun:
         return
     if time.time() + 60.0 * mark.kwargs.get("minutes", MINUTES) > end:
         pytest.skip(f"it might not end in time ({END}); `make test-long` has no limit")
     if "minutes" in mark.kwargs:
-        _begun.add(item.path.name)
+        _begun.add(str(item.path))

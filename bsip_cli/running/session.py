@@ -26,6 +26,8 @@ _LOADS = "correct [[loads]] in study.toml"
 _PART = "_(ses|task|tracksys|run)-"
 _NAME = rf"sub-[A-Za-z0-9]+({_PART}[A-Za-z0-9]+)*"  # of a person or a recording
 _IN_A_PATH = rf"(?<=/){_NAME}|{_NAME}(?=[/_.][A-Za-z])(?!{_PART})"  # or of a file
+_TIME = r"\d+\.\d+ to \d+\.\d+ s"
+_TIMES = rf"{_TIME}(, {_TIME})*( and \d+ more)?"
 _BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed} gone, about {remaining} left"
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
@@ -196,6 +198,7 @@ class _Voice:
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
             general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
+            general = re.sub(_TIMES, "at times", general)
             alike = self.said.setdefault((outcome.stage, general), [])
             if is_finding or not alike:
                 _say(outcome, sentence)

@@ -37,6 +37,18 @@ def test_of_the_study_it_is_said_whom_a_remark_is_of(capsys):
     assert "the same of sub-2, sub-3: participants.tsv: height_m 168 of it is in cm" in text
 
 
+def test_a_remark_at_other_times_is_the_same(capsys):
+    when = ("0.17 to 0.68 s, 1.90 to 2.42 s and 3 more", "0.00 to 0.25 s", "2.32 to 2.86 s")
+    outcomes = [
+        Outcome("ingest", f"sub-{k}", "done", (f"sub-{k}: left foot: beside: {one}; left out",))
+        for k, one in enumerate(when, 1)
+    ]
+    assert follow("run", [], (one for one in outcomes), 3, None) == 0
+    text = capsys.readouterr().err
+    assert f"ingest: sub-1: left foot: beside: {when[0]}; left out" in text
+    assert "ingest: the same of sub-2, sub-3: left foot: beside: at times; left out" in text
+
+
 def test_of_files_it_is_said_what_they_end_with(capsys):
     outcomes = [
         Outcome(

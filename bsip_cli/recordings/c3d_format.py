@@ -462,8 +462,8 @@ class Scaling:
 def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
     """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise.
 
-    What the file says may be no number, or zero: a plate of such channels is left out. An offset of
-    -32768 is the middle of counts without sign, written with one.
+    What the file says may be no number, or zero: a plate of such channels is left out. An offset at
+    either end of counts with a sign is the middle of counts without.
     """
     general = number(group, "GEN_SCALE") if np.size(group.get("GEN_SCALE", ())) else 1.0
     scales, offsets = np.ones(n_channels), np.zeros(n_channels)
@@ -472,7 +472,7 @@ def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
         values[: len(given)] = given
     with np.errstate(invalid="ignore", over="ignore"):
         scales *= general
-    is_unsigned = is_unsigned or bool((offsets == -_WORD // 2).any())
+    is_unsigned = is_unsigned or bool((np.abs(offsets) >= _WORD // 2 - 1).any())
     if is_unsigned:
         offsets = np.where(offsets < 0, offsets + _WORD, offsets)
     return Scaling(scales, offsets, is_unsigned)

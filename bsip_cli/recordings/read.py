@@ -358,7 +358,12 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
     if not any(plate.usable.any() for plate in plates):
         return "the force plates have no usable sample"
     total = np.sum([np.where(p.usable, p.force_N[:, 2], 0.0) for p in plates], axis=0)
-    largest = np.max(total, initial=0.0)
+    largest, pull = np.max(total, initial=0.0), -np.min(total, initial=0.0)
+    if largest < LOADED_N and pull > LOADED_N:
+        return (
+            f"the force plates push by {largest:.3g} N at most and pull by up to {pull:.0f} N: "
+            "their sign is not that of the session's other trials; export all with one"
+        )
     if largest < LOADED_N:
         found = f"the force plates were never loaded (at most {largest:.3g} N)"
         if not total.any():
@@ -383,7 +388,7 @@ def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
         check, found = "plate_force", f"vertical forces up to {largest / 1000:.1f} kN"
         expected = f"less than {_ABSURD_N / 1000:.0f} kN"
     elif pull > _PULL_SHARE * push and lift.min() < -LOADED_N:
-        found = f"pushes up to {lift.max():.0f} N and pulls up to {-lift.min():.0f} N"
+        found = f"pushes up to {max(lift.max(), 0):.0f} N and pulls up to {-lift.min():.0f} N"
         check, expected = "plate_sign", "pushes only"
     else:
         return None

@@ -56,12 +56,13 @@ def read_trc(path: Path) -> Trc:
         raise refusal(path, "no line that begins with 'Frame#'", "a TRC file")
     fields = _header_fields(above)
     mark = separator_of(heading)
-    names, are_apart = _names(heading, mark)
+    names, apart = _names(heading, mark)
     check_names([name for name in names if name], "labels", path)
-    axes = next(lines, "").split()  # X1, Y1, Z1, X2, ...
+    below = next(lines, "")  # X1, Y1, Z1, X2, ..., or a row where that line is left out
+    lines = chain([below] if _begins_a_row(below) else [], lines)
     first = list(islice((line for line in lines if line.strip()), ROWS_LOOKED_AT))
-    are_counted = are_apart and len(axes) == 3 * len(names)
-    rows = _Rows(names, are_apart, are_counted, dialect_of(mark, first), path)
+    are_counted = apart > 0 and len(below.split()) == 3 * len(names)
+    rows = _Rows(names, apart, are_counted, dialect_of(mark, first), path)
     rows.read(chain(first, lines))
     labels, positions = rows.labelled()
     about_points = without_sentinels(positions)
@@ -84,21 +85,27 @@ def read_trc(path: Path) -> Trc:
     return Trc(labels, stamps, positions, tuple(rates), counts_frames, findings)
 
 
-def _names(line: str, mark: str | None) -> tuple[list[str], bool]:
+def _begins_a_row(line: str) -> bool:
+    """With a frame and a time."""
+    cells = line.split()[:2]
+    return len(cells) == 2 and bool(np.isfinite([_number(cell) for cell in cells]).all())
+
+
+def _names(line: str, mark: str | None) -> tuple[list[str], int]:
     """Names of the trajectories behind 'Frame#' and 'Time', '' for one without a name.
 
     Names stand three places apart, or another number; where one is missing, a place is empty.
-    False: they stand anyhow, and the empty places say nothing.
+    0: they stand anyhow, and the empty places say nothing.
     """
     if mark is None:
-        return [printable(name) for name in _HEADER.sub("", line).split()[1:]], True
+        return [printable(name) for name in _HEADER.sub("", line).split()[1:]], 1
     cells = [printable(name) for name in without_end(parted(line, mark))[2:]]
     places = [k for k, name in enumerate(cells) if name]
     apart = np.diff(places)
     step = int(apart.min(initial=3 if len(places) < 2 else len(cells)))
     if (apart % step).any():
-        return [cells[place] for place in places], False
-    return cells[places[0] % step :: step] if places else [], True
+        return [cells[place] for place in places], 0
+    return cells[places[0] % step :: step] if places else [], step
 
 
 def _header_fields(lines: list[str]) -> dict[str, str]:
@@ -120,12 +127,12 @@ class _Rows:
     """What has been read of the table; eight bytes for each cell and no more."""
 
     def __init__(
-        self, names: list[str], are_apart: bool, are_counted: bool, dialect: Dialect, path: Path
+        self, names: list[str], apart: int, are_counted: bool, dialect: Dialect, path: Path
     ) -> None:
-        """names : of each place of the heading, '' for an empty one. are_apart : by one number of
-        places, so that an empty place is a trajectory. are_counted : the line below, X1, Y1, ...,
-        has three for each place."""
-        self.names, self.are_apart, self.are_counted = names, are_apart, are_counted
+        """names : of each place of the heading, '' for an empty one. apart : by how many places,
+        so that an empty place is a trajectory; 0 if anyhow. are_counted : the line below, X1, Y1,
+        ..., has three for each place."""
+        self.names, self.apart, self.are_counted = names, apart, are_counted
         self.dialect, self.path = dialect, path
         self.n_labels = sum(map(bool, names))
         self.times, self.positions, self.widths = array("d"), array("d"), array("L")
@@ -150,8 +157,10 @@ class _Rows:
             self.add(last)
         # As many trajectories as labels, or as places in the heading, or more behind them.
         n, enough = self.n_trajectories(), self.n_labels if self.are_counted else len(self.names)
-        if n != self.n_labels and not (n >= enough and self.are_apart):
+        if n != self.n_labels and not (n >= enough and self.apart):
             raise self.misfit(self.widest)
+        if self.apart > 3 and self.widest == 2 + self.apart * len(self.names):
+            raise self.misfit(self.widest)  # so many columns for each, of which X, Y, Z are three
         if not np.isfinite(self.times).all():
             expected = "times in column 2, numbers of one kind"
             raise refusal(self.path, "a row without a time", expected)

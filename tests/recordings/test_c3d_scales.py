@@ -42,15 +42,20 @@ def test_scales_that_do_not_reach_all_channels_are_said(n_scales, is_said):
     assert found == ["ANALOG:SCALE has 7 numbers for 12 channels"] * is_said
 
 
-@pytest.mark.parametrize("offset", [-32768.0, -32767.0, 0.0])
-def test_an_offset_of_half_the_counts_is_of_counts_without_sign(offset):
+@pytest.mark.parametrize(
+    ("offset", "first"),
+    [
+        (-32768.0, [0.0, -1.0, 8.0]),
+        (32767.0, [1.0, 0.0, 9.0]),
+        (-30000.0, [-2768.0, 62767.0, -2760.0]),
+        (0.0, [-32768.0, 32767.0, -32760.0]),
+    ],
+)
+def test_an_offset_of_half_the_counts_is_of_counts_without_sign(offset, first):
     group = {"OFFSET": np.array([offset, 0.0])}
-    counts = np.array([[-32768.0, 32767.0, -32760.0], [-3.0, 4.0, 5.0]])
+    counts = np.array([[-32768.0, 32767.0, -32760.0], [3.0, 4.0, 5.0]])
     found = scaling_of(group, 2, is_unsigned=False).applied(counts, is_float=False)
-    if offset == -32768.0:
-        np.testing.assert_array_equal(found[0], [0.0, -1.0, 8.0])
-    else:
-        np.testing.assert_array_equal(found, counts - np.array([[offset], [0.0]]))
+    np.testing.assert_array_equal(found, [first, counts[1]])
 
 
 def _excluded(path: Path) -> tuple[int, list[str]]:

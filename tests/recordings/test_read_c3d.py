@@ -12,7 +12,7 @@ import pytest
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plates import PlateDescription
-from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.read import open_recording, read_recording
 from tests.recordings.recording_writers import (
     CORNERS_M,
     ORIGIN_M,
@@ -116,6 +116,28 @@ def test_header_and_parameters_that_disagree(tmp_path):
     recording = read_recording(path)
     _check_wrench(recording)
     assert _levels(recording, "layout") == ["warning"]
+
+
+def test_more_plates_are_described_than_used(tmp_path):
+    markers, labels = standing_markers(N)
+    aside = _spec(corners_m=CORNERS_M + np.array([0.7, 0.0, 0.0]))
+    path = write_c3d(tmp_path / "a.c3d", markers, labels, [_spec(), aside])
+    content = ezc3d.c3d(str(path))
+    content["parameters"]["FORCE_PLATFORM"]["USED"]["value"] = [1]
+    content.write(str(path))
+    opened = open_recording(path)
+    assert [source.name for source in opened.sources] == ["1", "2"]
+    (said,) = [one for one in opened.recording.findings if one.check == "plate"]
+    assert (said.found, said.level) == ("FORCE_PLATFORM:USED is 1", "corrected")
+
+
+@pytest.mark.parametrize("away", [(0.0, 0.0, 0.06), (0.05, 0.0, 0.0)])
+def test_corners_that_are_no_rectangle_are_said(tmp_path, away):
+    corners = CORNERS_M.copy()
+    corners[2] += away
+    findings = read_recording(_write(tmp_path / "a.c3d", _spec(corners_m=corners))).findings
+    (said,) = [one for one in findings if one.check == "plate"]
+    assert "mm away from a rectangle's" in said.found and said.level == "warning"
 
 
 def test_rate_of_the_plates_that_is_no_multiple(tmp_path):

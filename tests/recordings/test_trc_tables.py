@@ -91,6 +91,26 @@ def test_a_place_of_the_heading_that_the_table_does_not_have(tmp_path):
     _is_as_written(_read(tmp_path, lines))
 
 
+@pytest.mark.parametrize("n", [len(LABELS), len(LABELS) // 3 * 3])
+def test_four_columns_for_each_label_are_refused(tmp_path, n):
+    """As many cells as four thirds of the labels have, or another number."""
+    heading = "Frame#\tTime\t" + "\t\t\t\t".join(LABELS[:n]) + "\t\t\t"
+
+    def with_a_fourth(_: int, cells: list[str]) -> list[str]:
+        triples = (cells[k : k + 3] for k in range(2, 2 + 3 * n, 3))
+        return cells[:2] + [x for triple in triples for x in (*triple, "1")]
+
+    lines = _lines(tmp_path)
+    with pytest.raises(BadDataError, match="labels"):
+        _read(tmp_path, _rows([*lines[:3], heading, "", *lines[-N:]], with_a_fourth))
+
+
+def test_a_table_without_the_line_of_axes(tmp_path):
+    lines = _lines(tmp_path)
+    recording = _read(tmp_path, [*lines[:4], *lines[-N:]])
+    _is_as_written(recording)
+
+
 def test_numbers_of_markers_with_and_without_the_unnamed(tmp_path):
     lines = _rows(_lines(tmp_path), UNNAMED["in all rows"][0])
     for stated in (8, 9):

@@ -20,7 +20,7 @@ from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
 from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.scene import by_segment, handedness
+from bsip_cli.recordings.scene import by_segment, crossed_limbs, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
@@ -340,12 +340,16 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
 
 
 def _about_sides(recording: Recording) -> list[Finding]:
-    """Parts of the body that have left and right exchanged."""
+    """Parts of the body that have left and right exchanged, or one of their ends."""
     found = "left and right markers are on the wrong sides, and not all over the body"
+    crossed = "left and right are exchanged at one end, which moves with the other side's"
     action = "left them as they are; correct the labels"
     return [
         Finding("labels", part, found, "left on the left", action, "warning")
         for part in handedness(recording.labels, recording.markers_m).exchanged()
+    ] + [
+        Finding("labels", limb, crossed, "ends of one segment", action, "warning")
+        for limb in crossed_limbs(recording.labels, recording.markers_m)
     ]
 
 

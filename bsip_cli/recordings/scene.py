@@ -57,6 +57,17 @@ _SIDED_PARTS = {
     ),
 }
 
+# Ends of segments: the distance between them changes less than that to the other side's other end.
+# In 80 pairs of public trials that move by 30 mm it changes by a third of that at most, from pelvis
+# to knee, which no segment joins, by 1.5 times (squats).
+_LIMBS = {
+    "thighs": ("asis", "knee_lateral"),
+    "shanks": ("knee_lateral", "malleolus_lateral"),
+    "upper arms": ("acromion", "elbow_lateral"),
+    "forearms": ("elbow_lateral", "styloid_radial"),
+}
+_CHANGES_M, _TIMES = 0.03, 2.0
+
 
 # --- the unit of length ---------------------------------------------------------------------------
 
@@ -412,8 +423,7 @@ class Handedness:
 
 def handedness(labels: Sequence[str], markers_m: np.ndarray) -> Handedness:
     """Of a trial's markers (n_frames, n_markers, 3), world frame, by what their labels mean."""
-    meant = meanings(labels)
-    known = {meant[n].landmark: k for k, n in enumerate(labels) if n in meant}
+    known = _landmarks(labels)
     frames = markers_m[:: max(1, len(markers_m) // _FEW_FRAMES)]
 
     def mean(names: Sequence[str]) -> np.ndarray:
@@ -433,3 +443,33 @@ def handedness(labels: Sequence[str], markers_m: np.ndarray) -> Handedness:
         if np.isfinite(sine).any():
             found[part] = float(np.nanmedian(sine))
     return Handedness(found)
+
+
+def crossed_limbs(labels: Sequence[str], markers_m: np.ndarray) -> list[str]:
+    """Segments of markers (n_frames, n_markers, 3) whose ends keep their distance from those of the
+    other side, and not from each other."""
+    known, found = _landmarks(labels), []
+    for limb, ends in _LIMBS.items():
+        names = [f"{end}_{side}" for end in ends for side in "lr"]
+        if not all(name in known for name in names):
+            continue
+        places = markers_m[:, [known[name] for name in names]]
+        places = places[np.isfinite(places).all(axis=(1, 2))]
+        if not len(places):
+            continue
+        upper_l, upper_r, lower_l, lower_r = places.swapaxes(0, 1)
+        own, other = (
+            max(float(np.std(np.linalg.norm(a - b, axis=1))) for a, b in pairs)
+            for pairs in (
+                ((upper_l, lower_l), (upper_r, lower_r)),
+                ((upper_l, lower_r), (upper_r, lower_l)),
+            )
+        )
+        if own > max(_CHANGES_M, _TIMES * other):
+            found.append(limb)
+    return found
+
+
+def _landmarks(labels: Sequence[str]) -> dict[str, int]:
+    meant = meanings(labels)
+    return {meant[n].landmark: k for k, n in enumerate(labels) if n in meant}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.c3d import open_c3d
-from bsip_cli.recordings.scene import Stature, stature
+from bsip_cli.recordings.scene import Stature, crossed_limbs, stature
 
 LABELS = ("LFHD", "RFHD", "C7", "LASI", "RASI", "LHEE", "LTOE", "RHEE", "RTOE")
 PARTS = np.array([0.985, 0.985, 0.88, 0.62, 0.62, 0.03, 0.03, 0.03, 0.03])
@@ -71,3 +71,19 @@ def test_children_are_as_tall_as_stated_and_no_sixth_taller(real_data, child):
     found = stature(recording.labels, recording.markers_m)
     assert found.part == "head" and found.against(stated_m) is None
     assert found.against(1.16 * stated_m) and found.against(0.86 * stated_m)
+
+
+def test_ankles_exchanged_in_walking_move_with_the_other_knee():
+    signs = {"l": 1.0, "r": -1.0}.items()
+    time_s = np.linspace(0.0, 3.0, 150)
+    swing = 0.3 * np.sin(2 * np.pi * time_s)
+    still = np.zeros_like(swing)
+    knees = {s: np.stack([0.5 * k * swing, 0.1 * k + still, 0.5 + still], axis=1) for s, k in signs}
+    ankles = {s: np.stack([k * swing, 0.1 * k + still, 0.1 + still], axis=1) for s, k in signs}
+    labels = ["LKNE", "RKNE", "LANK", "RANK"]
+    markers = np.stack([knees["l"], knees["r"], ankles["l"], ankles["r"]], axis=1)
+    assert crossed_limbs(labels, markers) == []
+    assert crossed_limbs(labels, markers[:, [0, 1, 3, 2]]) == ["shanks"]
+    assert crossed_limbs(labels, markers[:, [1, 0, 3, 2]]) == []
+    markers[:, 3] = np.nan
+    assert crossed_limbs(labels, markers) == []

@@ -61,11 +61,6 @@ def test_every_stage_takes_the_same_arguments(name):
     assert options == [*common, *own.get(name, [])]
 
 
-@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.label)
-def test_help_says_what_the_stage_does(stage):
-    assert cli.commands[stage.name].help == stage.summary
-
-
 def test_version_and_info(bsip):
     assert bsip("--version").out.split() == ["bsip,", "version", __version__]
     lines = bsip("info").out.splitlines()

@@ -6,7 +6,6 @@ All tests that need the run stand in this file, so that they share it.
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 import shutil
@@ -212,14 +211,6 @@ def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def test_listed_files_are_there_with_their_hash(first_run):
-    for kind, owner in (("report-files", "sub-01"), ("tables-files", "group")):
-        listed = first_run.read(kind, owner)
-        assert len(listed) > 5
-        for row in listed.itertuples():
-            assert sha256(first_run.out / row.file) == row.sha256
-
-
 def test_show_prints_the_tables(first_run, bsip):
     brief = bsip("show", first_run.out)
     assert brief.code == 0
@@ -331,16 +322,6 @@ def test_info_tells_what_made_an_artifact(first_run, bsip):
     assert any(line.startswith("  input   sub-01_skeleton.parquet sha256 ") for line in lines)
     assert "  option  participant = " in answer.out
     assert "  mass_kg [kg" in answer.out
-
-
-def test_the_folder_says_what_it_is(first_run):
-    found = json.loads((first_run.out / "dataset_description.json").read_text())
-    assert found["DatasetType"] == "derivative"
-    assert found["GeneratedBy"][0] == {
-        "Name": "bsip",
-        "Version": __version__,
-        "Description": "body segment inertial parameters from motion and ground forces",
-    }
 
 
 # --- what runs again ----------------------------------------------------------------------------
@@ -457,49 +438,37 @@ def make_other_version(path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [delete, truncate, make_other_kind, make_other_version])
-def test_artifact_that_is_none_is_made_again(run, damage):
+def test_artifact_that_is_none_is_refused_by_its_reader_and_made_again(run, damage):
     path = run.path("regression")
     content = path.read_bytes()
     assert run.perform("regress").state == "fresh"
     damage(path)
+    outcome = run.perform("identify")
+    if damage is delete:
+        assert outcome.state == "waiting"
+    else:
+        assert (outcome.state, outcome.exit_code) == ("refused", 3)
+        assert str(path) in outcome.sentences[0]
+        assert "To correct it: run " in outcome.sentences[0]
     assert run.perform("regress").state == "done"
     assert path.read_bytes() == content
-    assert run.perform("identify").state == "fresh"  # same bytes, nothing to do for readers
-
-
-@pytest.mark.parametrize("damage", [truncate, make_other_version])
-def test_reader_of_what_is_no_artifact_refuses_it_by_name(run, damage):
-    path = run.path("regression")
-    damage(path)
-    outcome = run.perform("identify")
-    assert (outcome.state, outcome.exit_code) == ("refused", 3)
-    assert str(path) in outcome.sentences[0]
-    assert "To correct it: run " in outcome.sentences[0]
-    assert run.perform("regress").state == "done"
-    assert run.perform("identify").state == "done"
+    assert run.perform("identify").state == ("fresh" if damage is delete else "done")
     assert not run.path("refusal-identify").exists()
 
 
 @pytest.mark.parametrize("change", [delete, lambda path: path.write_text("edited")])
-def test_lost_or_edited_table_is_made_again(run, bsip, change):
-    table = run.out / "group" / "tables" / "table1_segment_mass.csv"
-    content = table.read_bytes()
-    change(table)
-    answer = bsip("tables", run.study, "--out", run.out)
-    assert answer.summary.startswith("bsip tables: 1 done;")
-    assert table.read_bytes() == content
-
-
-def test_edited_report_is_made_again_and_that_is_said(run):
-    report = run.out / "sub-01" / "report.html"
-    content = report.read_bytes()
-    assert run.perform("report").state == "fresh"
-    report.write_bytes(content.replace(b"<h1>", b"<h1>My "))
-    assert report.read_bytes() != content
-    outcome = run.perform("report")
-    said = "sub-01/report.html has changed since bsip wrote it: made again"
-    assert (outcome.state, outcome.sentences[0]) == ("done", said)
-    assert report.read_bytes() == content
+@pytest.mark.parametrize("name", ["sub-01/report.html", "group/tables/table1_segment_mass.csv"])
+def test_lost_or_edited_page_is_made_again_and_that_is_said(run, change, name):
+    page = run.out / name
+    unit = run.unit_of_group("tables") if "tables" in name else run.unit("report")
+    content = page.read_bytes()
+    assert perform(unit).state == "fresh"
+    change(page)
+    outcome = perform(unit)
+    assert outcome.state == "done"
+    if change is not delete:
+        assert outcome.sentences[0] == f"{name} has changed since bsip wrote it: made again"
+    assert page.read_bytes() == content
 
 
 # --- whose results are stale stays out of the group ---------------------------------------------

@@ -218,7 +218,6 @@ ONE = ("F", pytest.approx(70.5, abs=0.05), pytest.approx(1.63, abs=0.005))
         # columns
         ("Subject\tGender\tweight\tHeight (cm)\nsub-01\tfemale\t70.5\t163\n", []),
         ("Participant ID\tSex\tweight_kg\tstature mm\nsub-01\tF\t70.5\t1630\n", []),
-        ("ID\tsex\tMass [kg]\tHeight [m]\nsub-01\tF\t70.5\t1.63\n", []),
         ("ID\tsex\tBody mass (lbs)\tHeight (in)\nsub-01\tF\t155.4\t64.2\n", []),
         ("ID\tsexe\tPoids (g)\tTaille (cm)\nsub-01\tfemme\t70500\t163\n", []),
         ("ID\tsexo\tweight [N]\taltura\nsub-01\tmujer\t691.4\t1,63\n", []),
@@ -329,7 +328,6 @@ def test_a_sidecar_that_cannot_be_read_is_said(empty_study):
     ("mass", "height", "said"),
     [
         ("163", "1.63", "index of 61.3 kg/m2, people have 12 to 60; in lb the mass would be 73.9"),
-        ("165", "1.63", "in lb the mass would be 74.8 kg and the index 28.2"),
         ("11", "1.63", "in st the mass would be 69.9 kg and the index 26.3"),
         ("26", "1.9", "index of 7.2 kg/m2, people have 12 to 60: used as it stands"),
     ],

@@ -126,19 +126,17 @@ def test_wanted_rows_of_an_empty_table(path):
     assert list(read_artifact(path, "used-blocks", trial=["a"])) == list(BLOCKS)
 
 
-def foreign(path):
-    pq.write_table(pa.table({"x": [1, 2]}), path)
-
-
-def truncated(path):
-    path.write_bytes(path.read_bytes()[:-30])
-
-
-def text(path):
-    path.write_text("trial,start_s,end_s\n")
-
-
-@pytest.mark.parametrize("damage", [foreign, truncated, text, lambda path: path.unlink()])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: pq.write_table(pa.table({"x": [1, 2]}), path),
+        lambda path: path.write_bytes(path.read_bytes()[:-30]),
+        lambda path: path.write_text("trial,start_s,end_s\n"),
+        lambda path: path.write_bytes(b""),
+        lambda path: path.unlink(),
+    ],
+    ids=["foreign", "truncated", "text", "empty", "absent"],
+)
 def test_what_is_no_artifact_is_refused_by_name(written, damage):
     damage(written)
     with pytest.raises(BadDataError) as caught:

@@ -6,10 +6,11 @@ import pytest
 
 from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
+from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import Stage
 from bsip_cli.running import session
 from bsip_cli.running.processes import EndedError
-from bsip_cli.running.runner import Manner, run_stages
+from bsip_cli.running.runner import Manner, held_alone, run_stages
 from bsip_cli.study.study import load_study
 
 STAGES = {
@@ -134,3 +135,17 @@ def test_warnings_of_a_refused_unit_are_told_before_the_refusal_and_kept_with_it
     path = tmp_path / "out" / "sub-01" / "sub-01_refusal-doubtful.parquet"
     refusal = read_header(path, "refusal")
     assert refusal["provenance"]["messages"] == ["sub-01: the labels look exchanged"]
+
+
+# --- who may write into a folder ------------------------------------------------------------------
+
+
+def test_an_error_of_the_work_itself_stays_what_it_is(tmp_path):
+    with pytest.raises(FileNotFoundError, match="a bug"), held_alone(tmp_path / "sub-01"):
+        raise FileNotFoundError("a bug")
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="cannot be written"), held_alone(tmp_path / "file" / "x"):
+        pass

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +18,7 @@ from tests.fuzz.fuzz_study import _write_trc_mot
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "sub-01"
 STATIC, WALK = SAMPLE / "sub-01_task-static.c3d", SAMPLE / "sub-01_task-walking_run-1.c3d"
+CUT = WALK.read_bytes()[:5000]
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
@@ -172,29 +172,17 @@ def test_a_table_of_other_people_is_said(lab, capsys):
 # --- what is not used, and why --------------------------------------------------------------------
 
 
-def _packed(lab: Path) -> None:
-    (lab / "run1.c3d.gz").write_bytes(gzip.compress(b"x"))
-
-
-def _broken(lab: Path) -> None:
-    (lab / "broken.c3d").write_bytes(WALK.read_bytes()[:5000])
-
-
-def _two_forces(lab: Path) -> None:
-    shutil.copy(lab / "gait3-GRF.mot", lab / "gait3_forces.mot")
-
-
-def _bad_forces(lab: Path) -> None:
-    (lab / "gait3-GRF.mot").write_text("nothing\n")
-
-
 @pytest.mark.parametrize(
     ("change", "code", "said"),
     [
-        (_packed, 3, "run1.c3d.gz: is packed: unpack it"),
-        (_broken, 3, "not used: broken.c3d: "),
-        (_two_forces, 3, "gait3-GRF.mot and gait3_forces.mot are both forces of gait3.trc"),
-        (_bad_forces, 3, "not used: gait3-GRF.mot: "),
+        (lambda lab: (lab / "run1.c3d.gz").write_bytes(b"x"), 3, "run1.c3d.gz: is packed: unpack"),
+        (lambda lab: (lab / "broken.c3d").write_bytes(CUT), 3, "not used: broken.c3d: "),
+        (
+            lambda lab: shutil.copy(lab / "gait3-GRF.mot", lab / "gait3_forces.mot"),
+            3,
+            "gait3-GRF.mot and gait3_forces.mot are both forces of gait3.trc",
+        ),
+        (lambda lab: (lab / "gait3-GRF.mot").write_text("?"), 3, "not used: gait3-GRF.mot: "),
         (lambda lab: shutil.copy(lab / "Gait_2.C3D", lab / "copy.c3d"), 0, "holds the same as"),
         (lambda lab: _write_trc_mot(WALK, lab / "Gait_2"), 0, "Gait_2.C3D, of the same name, is"),
         (lambda lab: (lab / "other.mot").write_text("x"), 0, "no TRC of its name is there"),

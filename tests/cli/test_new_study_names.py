@@ -106,28 +106,33 @@ def test_names(files, expected):
     assert names(*files) == expected
 
 
-def test_subjects_that_files_name_tell_people_apart_and_are_not_spread():
-    """As in btk_pig, where names of files say nothing of the person."""
+@pytest.mark.parametrize(
+    ("subjects", "form", "expected"),
+    [
+        (  # as in btk_pig: names of people are not spread
+            {"Full": "Jane Doe", "Hole": "John Doe"},
+            "PiG_{1}-{0}.c3d",
+            ["01_static_1", "01_MotionFull_1", "02_static_1", "02_MotionHole_1"],
+        ),
+        (
+            {"XY": "XY", "ZA": "ZA"},
+            "{0}-{1}.c3d",
+            ["XY_static_1", "XY_Motion_1", "ZA_static_1", "ZA_Motion_1"],
+        ),
+        (
+            {"JD": "Jane Doe", "MM": "Max Mustermann"},
+            "{0}_{1}.c3d",
+            ["JD_static_1", "JD_Motion_1", "MM_static_1", "MM_Motion_1"],
+        ),
+    ],
+)
+def test_subjects_that_files_name_tell_people_apart(subjects, form, expected):
     files = [
-        found(f"PiG_{what}-{which}.c3d", subject)
-        for which, subject in (("Full", "Jane Doe"), ("Hole", "John Doe"))
+        found(form.format(short, what), subject)
+        for short, subject in subjects.items()
         for what in ("Calibration", "Motion")
     ]
-    assert names(*files) == ["01_static_1", "01_MotionFull_1", "02_static_1", "02_MotionHole_1"]
-
-
-def test_subjects_that_file_names_show_name_the_person():
-    files = [found(f"{one}-{what}.c3d", one) for one in ("XY", "ZA") for what in ("cal", "turn")]
-    assert names(*files) == ["XY_static_1", "XY_turn_1", "ZA_static_1", "ZA_turn_1"]
-
-
-def test_subjects_and_the_beginnings_of_names_agree():
-    files = [
-        found(f"{short}_{what}.c3d", name)
-        for short, name in (("JD", "Jane Doe"), ("MM", "Max Mustermann"))
-        for what in ("turn", "walk1")
-    ]
-    assert names(*files) == ["JD_turn_1", "JD_walk_1", "MM_turn_1", "MM_walk_1"]
+    assert names(*files) == expected
 
 
 def test_other_markers_are_other_people_and_it_is_said():

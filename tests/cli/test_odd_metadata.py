@@ -75,9 +75,17 @@ def test_foreign_texts_are_shown_in_their_line(tmp_path, monkeypatch, made_by):
     assert not [line for line in lines if "\n" in line]
 
 
-def test_the_command(tmp_path, bsip):
-    said = bsip("info", write(tmp_path / "a.parquet", WRONG["list"]))
-    assert said.code == 3 and len(said.err.splitlines()) == 1
-    os.mkfifo(tmp_path / "b.parquet")
-    said = bsip("info", tmp_path / "b.parquet")
-    assert said.code == 3 and "is a FIFO" in said.err
+@pytest.mark.parametrize(
+    ("make", "found"),
+    [
+        (lambda path: write(path, WRONG["list"]), "is not an artifact of bsip"),
+        (lambda path: path.write_bytes(b"no artifact"), "is not an artifact of bsip"),
+        (os.mkfifo, "is a FIFO"),
+        (lambda path: None, "does not exist"),
+    ],
+)
+def test_the_command(tmp_path, bsip, make, found):
+    make(path := tmp_path / "a.parquet")
+    said = bsip("info", path)
+    (line,) = said.err.splitlines()
+    assert said.code == 3 and f"{path}: " in line and found in line

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from bsip_cli import __version__
 from bsip_cli.errors import UsageError
 from bsip_cli.study.study import DESCRIPTION, describe_dataset, make_out
 
@@ -27,15 +28,7 @@ def study(empty_study) -> Path:
 
 @pytest.mark.parametrize(
     "place",
-    [
-        "derivatives/bsip",
-        "derivatives",
-        "results",
-        "a/b/c",
-        "../out",
-        "sub-01_results",
-        "../study-2",
-    ],
+    ["derivatives/bsip", "derivatives", "a/b/c", "../out", "sub-01_results", "../study-2"],
 )
 def test_results_lie_apart(study, place):
     make_out(study / place, study)
@@ -93,7 +86,12 @@ def test_the_description_is_kept_up_to_date(study, tmp_path):
     assert describe_dataset(tmp_path, study) == ""
     description = json.loads((tmp_path / DESCRIPTION).read_text())
     assert description["Name"] == "bsip results of study"
-    assert description["GeneratedBy"][0]["Name"] == "bsip"
+    assert description["DatasetType"] == "derivative"
+    assert description["GeneratedBy"][0] == {
+        "Name": "bsip",
+        "Version": __version__,
+        "Description": "body segment inertial parameters from motion and ground forces",
+    }
     written = (tmp_path / DESCRIPTION).stat().st_mtime_ns
     assert describe_dataset(tmp_path, study) == ""
     assert (tmp_path / DESCRIPTION).stat().st_mtime_ns == written

@@ -1,7 +1,6 @@
 """Participants and recordings as they lie in a study folder."""
 
 import json
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -27,20 +26,19 @@ def load(root: Path):
     return study, [str(refusal) for refusal in refusals]
 
 
-def test_roles_by_task(empty_study):
+def test_roles_by_task_in_one_order(empty_study):
+    """Whatever the file system says: results must not depend on it."""
     folder = empty_study / "sub-01"
-    for task in ("dance_run-1", "throwing_run-2", "throwing_run-10"):
+    for task in ("throwing_run-2", "dance_run-1", "throwing_run-10"):
         (folder / f"sub-01_task-{task}.c3d").write_bytes(b"")
-    (folder / "notes.txt").write_text("no recording")
     study, refusals = load(empty_study)
     assert refusals == []
-    found = {trial.stem.split("task-")[1]: trial.role for trial in study.participants[0].trials}
-    assert found == {
-        "static": "static",
-        "dance_run-1": "sequence",
-        "throwing_run-2": "validation",
-        "throwing_run-10": "validation",
-    }
+    assert [(t.stem.split("task-")[1], t.role) for t in study.participants[0].trials] == [
+        ("dance_run-1", "sequence"),
+        ("static", "static"),
+        ("throwing_run-10", "validation"),
+        ("throwing_run-2", "validation"),
+    ]
 
 
 def test_facts_of_the_participants(empty_study):
@@ -121,16 +119,6 @@ def test_table_that_cannot_be_read(empty_study, content, said):
         load(empty_study)
 
 
-def test_recording_whose_name_says_nothing(empty_study):
-    """Refused by name; the participant's other recordings are used."""
-    odd = empty_study / "sub-01" / "Trial 01.c3d"
-    odd.write_bytes(b"")
-    study, refusals = load(empty_study)
-    assert [trial.task for trial in study.participants[0].trials] == ["static"]
-    assert len(refusals) == 1
-    assert refusals[0].startswith(f"{odd}: its name does not say what it is")
-
-
 def test_a_folder_whose_only_recording_is_misnamed_names_it(empty_study):
     folder = empty_study / "sub-01"
     (folder / "sub-01_task-static.c3d").rename(folder / "sub-01_task-my-static.c3d")
@@ -148,36 +136,18 @@ def test_all_faults_of_a_row_are_said_at_once(empty_study):
         assert found in refusal
 
 
-def test_two_recordings_of_one_name(empty_study):
-    (empty_study / "sub-01" / "sub-01_task-static.trc").write_bytes(b"")
-    study, refusals = load(empty_study)
-    assert [person.id for person in study.participants] == ["sub-02"]
-    assert "of one name, but for capitals and the ending: sub-01_task-static.c3d, " in refusals[0]
-
-
-@pytest.mark.parametrize("ending", ["trc", "TRC"])
-def test_forces_beside_a_trc_belong_to_its_inputs(empty_study, ending):
+def test_forces_beside_a_trc_belong_to_its_inputs(empty_study):
     """A changed .mot must count as a changed recording."""
-    folder = empty_study / "sub-01"
-    for name in (f"sub-01_task-walk.{ending}", "sub-01_task-walk.mot", "sub-01_task-static.mot"):
-        (folder / name).write_bytes(b"")
+    for name in ("walk.TRC", "walk.mot", "static.mot"):
+        (empty_study / "sub-01" / f"sub-01_task-{name}").write_bytes(b"")
     study, _ = load(empty_study)
-    participant = study.participants[0]
-    static, walk = sorted(participant.trials, key=lambda trial: trial.task)
-    names = [
-        sorted(Unit(STAGES[0], study, Path("out"), load_config([]), participant, t).inputs())
-        for t in (static, walk)
-    ]
-    assert names[0] == ["sub-01_task-static.c3d"]
-    assert names[1] == sorted(["sub-01_task-walk.mot", f"sub-01_task-walk.{ending}"])
-
-
-def test_trials_keep_one_order(empty_study):
-    """Whatever the file system says: results must not depend on it."""
-    for run in (3, 1, 2):
-        (empty_study / "sub-01" / f"sub-01_task-walk_run-{run}.c3d").write_bytes(b"")
-    stems = [trial.stem for trial in load(empty_study)[0].participants[0].trials]
-    assert all(a < b for a, b in pairwise(stems))
+    person = study.participants[0]
+    static, walk = (
+        sorted(Unit(STAGES[0], study, Path("out"), load_config([]), person, trial).inputs())
+        for trial in person.trials
+    )
+    assert static == ["sub-01_task-static.c3d"]
+    assert walk == ["sub-01_task-walk.TRC", "sub-01_task-walk.mot"]
 
 
 # --- participants.tsv as laboratories write it: what is read, what is said, what is refused -------
@@ -248,7 +218,6 @@ ONE = ("F", pytest.approx(70.5, abs=0.05), pytest.approx(1.63, abs=0.005))
         # columns
         ("Subject\tGender\tweight\tHeight (cm)\nsub-01\tfemale\t70.5\t163\n", []),
         ("Participant ID\tSex\tweight_kg\tstature mm\nsub-01\tF\t70.5\t1630\n", []),
-        ("ID\tsex\tMass [kg]\tHeight [m]\nsub-01\tF\t70.5\t1.63\n", []),
         ("ID\tsex\tBody mass (lbs)\tHeight (in)\nsub-01\tF\t155.4\t64.2\n", []),
         ("ID\tsexe\tPoids (g)\tTaille (cm)\nsub-01\tfemme\t70500\t163\n", []),
         ("ID\tsexo\tweight [N]\taltura\nsub-01\tmujer\t691.4\t1,63\n", []),
@@ -359,7 +328,6 @@ def test_a_sidecar_that_cannot_be_read_is_said(empty_study):
     ("mass", "height", "said"),
     [
         ("163", "1.63", "index of 61.3 kg/m2, people have 12 to 60; in lb the mass would be 73.9"),
-        ("165", "1.63", "in lb the mass would be 74.8 kg and the index 28.2"),
         ("11", "1.63", "in st the mass would be 69.9 kg and the index 26.3"),
         ("26", "1.9", "index of 7.2 kg/m2, people have 12 to 60: used as it stands"),
     ],

@@ -10,6 +10,11 @@ from bsip_cli.running.session import follow
 REMARK = "markers: no markers on the head"
 
 
+def told(capsys, outcomes: list[Outcome], code: int = 0, **voice: bool) -> str:
+    assert follow("run", [], (one for one in outcomes), len(outcomes), None, **voice) == code
+    return capsys.readouterr().err
+
+
 def said(capsys, **voice: bool) -> str:
     outcomes = [
         Outcome("ingest", f"sub-{k}", "done", (f"sub-{k}: {REMARK}",), 0, 1.25, ("markers",))
@@ -17,8 +22,7 @@ def said(capsys, **voice: bool) -> str:
     ]
     outcomes.append(Outcome("diagnose", "sub-1", "done", ("sub-1: something is wrong",)))
     outcomes.append(Outcome("ik", "sub-2", "refused", ("sub-2: too short",), 3))
-    assert follow("run", [], (one for one in outcomes), len(outcomes), None, **voice) == 3
-    return capsys.readouterr().err
+    return told(capsys, outcomes, 3, **voice)
 
 
 def test_a_remark_is_made_once_for_the_study(capsys):
@@ -31,9 +35,7 @@ def test_a_remark_is_made_once_for_the_study(capsys):
 
 def test_of_the_study_it_is_said_whom_a_remark_is_of(capsys):
     sentences = tuple(f"participants.tsv: height_m 168 of sub-{k} is in cm" for k in (1, 2, 3))
-    study = Outcome("study", "study", "noted", sentences)
-    assert follow("run", [], (one for one in [study]), 1, None) == 0
-    text = capsys.readouterr().err
+    text = told(capsys, [Outcome("study", "study", "noted", sentences)])
     assert "the same of sub-2, sub-3: participants.tsv: height_m 168 of it is in cm" in text
 
 
@@ -43,23 +45,17 @@ def test_a_remark_at_other_times_is_the_same(capsys):
         Outcome("ingest", f"sub-{k}", "done", (f"sub-{k}: left foot: beside: {one}; left out",))
         for k, one in enumerate(when, 1)
     ]
-    assert follow("run", [], (one for one in outcomes), 3, None) == 0
-    text = capsys.readouterr().err
+    text = told(capsys, outcomes)
     assert f"ingest: sub-1: left foot: beside: {when[0]}; left out" in text
     assert "ingest: the same of sub-2, sub-3: left foot: beside: at times; left out" in text
 
 
 def test_of_files_it_is_said_what_they_end_with(capsys):
-    outcomes = [
-        Outcome(
-            "export", name, "done", (f"{name}: out/sub-1/export: {name}_motion.mot, {name}.xml",)
-        )
-        for name in ("sub-1_task-squat_run-1", "sub-1_task-static")
-    ]
-    assert follow("export", [], (one for one in outcomes), 2, None) == 0
-    text = capsys.readouterr().err
-    first = "export: sub-1_task-squat_run-1: out/sub-1/export: sub-1_task-squat_run-1_motion.mot, "
-    assert first in text
+    names = "sub-1_task-squat", "sub-1_task-static"
+    lines = [f"{name}: out/sub-1/export: {name}_motion.mot, {name}.xml" for name in names]
+    pairs = zip(names, lines, strict=True)
+    text = told(capsys, [Outcome("export", name, "done", (line,)) for name, line in pairs])
+    assert f"export: {lines[0]}\n" in text
     others = "the same of sub-1_task-static: out/.../export: ..._motion.mot, ....xml"
     assert f"export: {others}" in text
 

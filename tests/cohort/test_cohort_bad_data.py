@@ -7,16 +7,7 @@ import pytest
 from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.report.tables.build import IN_PRINT, NAMES, RENDERERS, show
 from bsip_cli.report.tables.published import comparison_name
-from bsip_cli.running.runner import perform
-from bsip_cli.stages import stats as stats_stage
-
-NOTES = {"made_by": {}, "messages": [], "facts": {}}
-P_COLUMNS = {
-    "table1_segment_mass": "p",
-    "table2_cop_rmse": "p",
-    "table3_posturography": "p",
-    "table4_cross_validation": "p",
-}
+from tests.cohort.conftest import NOTES
 
 
 def refuse(cohort, participant: str, stage: str, stem: str = "") -> None:
@@ -30,14 +21,14 @@ def test_too_few_participants(make_cohort, participants):
     """Means and SDs are printed, tests are named as not possible."""
     cohort = make_cohort(participants)
     cohort.run()
-    for name, column in P_COLUMNS.items():
+    for name in NAMES[:4]:
         table = cohort.table(name)
         means = [c for c in table.columns if c.startswith("om_mean")]
         sds = [c for c in table.columns if c.startswith("om_sd")]
         assert (table[means].notna().sum(axis=1) == 1).all()
         assert (table[sds].notna().sum(axis=1) == (1 if participants == 2 else 0)).all()
         tested = name == "table3_posturography" and participants == 2  # a one-way ANOVA needs two
-        assert table[column].notna().all() if tested else table[column].isna().all()
+        assert table["p"].notna().all() if tested else table["p"].isna().all()
         assert table["reason"].notna().all()
         assert "Not possible (all rows): " in cohort.text(name)
         word = "participant" if participants == 1 else "participants"
@@ -86,15 +77,6 @@ def test_refused_and_missing_trials(make_cohort):
     assert five.loc[("walking", "fx", "OM"), ["n", "williams_n"]].tolist() == [7, 6]
     assert "sub-04_task-walking" in cohort.text("table5_six_components")
     assert "sub-04_task-walking" not in cohort.text("table4_cross_validation")
-
-
-def test_participant_without_sequence_is_named(make_cohort):
-    cohort = make_cohort(4)
-    trial = next(t for t in cohort.study.participants[0].trials if t.task == "sequence")
-    for kind in stats_stage.IN_OTHERS:
-        cohort.path(kind, "sub-01", trial).unlink()
-    messages = cohort.perform("stats").sentences
-    assert "sub-01 has no identification trial: not in tables 2, 3 and 6" in messages
 
 
 def test_columns_that_do_not_vary(make_cohort):
@@ -212,22 +194,12 @@ def test_freshness_and_files(make_cohort):
     assert cohort.perform("tables", force=True).state == "done"
     assert before == {file: (cohort.out / file).read_bytes() for file in listed["file"]}
     stricter = cohort.config.stats.model_copy(update={"alpha": 0.01})
-    unit = cohort.unit("stats")
-    unit.config = cohort.config.model_copy(update={"stats": stricter})
-    assert perform(unit).state == "done"
-    assert cohort.perform("tables").state == "done"
+    cohort.config = cohort.config.model_copy(update={"stats": stricter})
+    assert [cohort.perform(name).state for name in ("stats", "tables")] == ["done", "done"]
+    assert "99% CI" in cohort.text(NAMES[0]) and "99\\% CI" in cohort.text(NAMES[0], "tex")
+    assert "significant: p < .01." in cohort.text(NAMES[0])
     facts = read_header(cohort.out / "group" / "group_values.parquet")["provenance"]["facts"]
     assert (facts["missing"], facts["participants"]) == ([], 3)
-
-
-def test_level_of_the_interval_follows_alpha(make_cohort):
-    cohort = make_cohort(5)
-    strict = cohort.config.stats.model_copy(update={"alpha": 0.01})
-    cohort.config = cohort.config.model_copy(update={"stats": strict})
-    cohort.run()
-    assert "99% CI" in cohort.text("table1_segment_mass")
-    assert "99\\% CI" in cohort.text("table1_segment_mass", "tex")
-    assert "significant: p < .01." in cohort.text("table1_segment_mass")
 
 
 def test_show_without_tables(tmp_path):

@@ -14,7 +14,6 @@ from bsip_cli.report.tables.formats import escape_markdown as markdown
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
 from bsip_cli.report.tables.model import Column, Row, Table, interval, mean_sd, number, p_value
 from bsip_cli.report.tables.published import comparison_name
-from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import Criteria
 
 BESIDE = tuple(map(comparison_name, IN_PRINT))
@@ -120,13 +119,6 @@ def test_numbers():
     assert mean_sd(2)(36123.4, 2799.6) == "36123(2800)"
     assert interval(2)(-0.104, 0.01) == "[-0.10, 0.01]"
     assert interval(2)(nan, nan) == "-"
-
-
-def test_segments_in_words():
-    assert segment_label("upper_arm_l") == "left upper arm"
-    assert segment_label("lower_torso") == "lower torso"
-    assert segment_label("clavicle_r") == "right clavicle"
-    assert segment_label("head") == "head"
 
 
 def rows_of(text: str) -> list[list[str]]:

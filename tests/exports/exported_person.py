@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -83,9 +84,11 @@ def configuration(body: IdentifiedPerson, placed: dict[str, pin.SE3]) -> np.ndar
     return q
 
 
-def velocity(model: pin.Model, before: np.ndarray, after: np.ndarray, span_s: float) -> np.ndarray:
-    """(nv,) mean velocity between two configurations."""
-    return pin.difference(model, before, after) / span_s
+def moving_body(body: IdentifiedPerson, placed_at: Callable[[float], dict[str, pin.SE3]]) -> Whole:
+    """Of our model at time zero, whose joint frames lie like this at times near it [s]."""
+    model, h_s = our_model(body), 1e-5
+    before, here, after = (configuration(body, placed_at(t)) for t in (-h_s, 0.0, h_s))
+    return whole_body(model, here, pin.difference(model, before, after) / (2 * h_s))
 
 
 def joint_frames(model: pin.Model, q: np.ndarray) -> list[pin.SE3]:

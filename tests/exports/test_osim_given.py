@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.exports.identified import neutral_pose
 from bsip_cli.body.exports.osim import (
@@ -122,19 +123,9 @@ def _add_joint(links, kind, name, parent, child, placed, centre) -> None:
         element = ET.SubElement(frames, "PhysicalOffsetFrame", name=f"{end}_offset")
         socket = "/ground" if end == "ground" else f"/bodyset/{end}"
         ET.SubElement(element, "socket_parent").text = socket
-        angles = _xyz_angles(offset.rotation)
-        ET.SubElement(element, "translation").text = " ".join(
-            map(repr, offset.translation.tolist())
-        )
-        ET.SubElement(element, "orientation").text = " ".join(map(repr, angles))
-
-
-def _xyz_angles(rotation: np.ndarray) -> list[float]:
-    """Body-fixed X, Y, Z."""
-    y = np.arcsin(rotation[0, 2])
-    x = np.arctan2(-rotation[1, 2], rotation[2, 2])
-    z = np.arctan2(-rotation[0, 1], rotation[0, 0])
-    return [float(angle) for angle in (x, y, z)]
+        angles = Rotation.from_matrix(offset.rotation).as_euler("XYZ")
+        for name, numbers in (("translation", offset.translation), ("orientation", angles)):
+            ET.SubElement(element, name).text = " ".join(map(repr, numbers.tolist()))
 
 
 def inertias_in(text: str) -> dict[str, pin.Inertia]:

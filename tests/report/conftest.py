@@ -6,8 +6,10 @@ import pytest
 
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
+from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
+from bsip_cli.stages.report import record_of
 from bsip_cli.study.study import Participant, Study
 from tests.report.fake_study import Artifacts, study
 
@@ -48,3 +50,9 @@ def reports(tmp_path_factory) -> Reports:
     for stage in ("stats", "tables", "report"):
         made.run(stage)
     return made
+
+
+@pytest.fixture(scope="session")
+def record(reports) -> ParticipantRecord:
+    """What the report of the first person is made of."""
+    return record_of(reports.unit("report", reports.study.participants[0]))

@@ -5,17 +5,22 @@ from __future__ import annotations
 import base64
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import write_artifact
+from bsip_cli.artifacts import empty_table, write_artifact
+from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.report.blocks import Document, Picture
-from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
+from bsip_cli.schemas import SCHEMAS
+from bsip_cli.stages.frames import bsip_table
 from bsip_cli.stages.joints import peaks_of
+from bsip_cli.stages.scale import _marker_table, _skeleton_table
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Participant, Study, Trial
+from tests.body.standing_person import standing
 
 MASS_KG, GRAVITY = 62.8, 9.80665
 LEFT_OUT = {"knee_l": "both feet are on one plate: 3 frames", "elbow_r": ""}
@@ -24,35 +29,18 @@ EVIL = "<script>alert('$x_1$')</script>"
 TASKS = {"static": "static", "sequence": "sequence", "basketball": "validation"}
 DURATIONS_S = {"static": 2.0, "sequence": 14.0, "basketball": 3.0}
 RATE_HZ = 50.0
-_JOINTS = {  # joint centre in the parent, right side; origin of the parent where it differs
-    "lower_torso": (0, 0, 0),
-    "upper_torso": (0, 0.05, 0),
-    "head": (0, 0.0, 0),
-    "upper_arm": (0, -0.05, 0.18),
-    "forearm": (0, -0.29, 0),
-    "hand": (0, -0.25, 0),
-    "thigh": (0.02, -0.1, 0.09),
-    "shank": (0, -0.42, 0),
-    "foot": (0, -0.41, 0),
-}
-_LENGTHS = dict(zip(_JOINTS, (0.1, 0.48, 0.25, 0.29, 0.25, 0.08, 0.42, 0.41, 0.17), strict=True))
-_PARTS = (0.142, 0.333, 0.067, 0.024, 0.017, 0.006, 0.123, 0.048, 0.011)
-_SHARES = dict(zip(_JOINTS, _PARTS, strict=True))
-_TIPS = {
-    "foot": ((-0.05, -0.06, 0.0), (0.13, -0.06, 0.0)),
-    "hand": ((0.0, -0.08, 0.0),),
-    "head": ((0.1, 0.15, 0.0), (0.0, 0.15, 0.07), (0.0, 0.15, -0.07)),
-}
+PERSON = standing().person
+SAME = SimpleNamespace(  # calibration and refinement, which changed nothing
+    person=PERSON,
+    length_sd_m=np.full(15, 0.004),
+    poses=SimpleNamespace(residual_m=np.full((1, len(PERSON.markers)), 0.005)),
+)
 _KINDS = ["fx", "fy", "fz", "mx", "my", "mz"]
 
 
 def frame(columns: str, *rows: tuple) -> pd.DataFrame:
     """A table with columns of these names."""
     return pd.DataFrame(list(rows), columns=columns.split())
-
-
-def part(segment: str) -> str:
-    return segment[:-2] if segment.endswith(("_l", "_r")) else segment
 
 
 def participant(name: str = "sub-01") -> Participant:
@@ -102,7 +90,7 @@ class Artifacts:
 
     def write_all(self) -> Artifacts:
         self.write("person", self.facts())
-        self.write("skeleton", self.skeleton_rows())
+        self.write("skeleton", _skeleton_table(self.skeleton, SAME, SAME))
         self.write("marker-positions", self.markers())
         self.write("bsip", self.bsip())
         self.write("excitation", excitation(self.skeleton))
@@ -128,7 +116,8 @@ class Artifacts:
             self.write("joint-moments", moments, trial)
             self.write("joint-peaks", peaks_of(moments, MASS_KG, LEFT_OUT), trial)
         self.write("posturography", posturography(), trial)
-        self.write("correlation-difference", empty("correlation-difference"), trial)
+        nothing = empty_table("correlation-difference")
+        self.write("correlation-difference", nothing, trial)
 
     # --- participant ------------------------------------------------------------------------
 
@@ -140,65 +129,24 @@ class Artifacts:
             ("M", MASS_KG, "participants.tsv", 63.1, "", 1.63, "", 1.0, 0.0, stem, 0.0067),
         )
 
-    def skeleton_rows(self) -> pd.DataFrame:
-        rows = []
-        known = self.skeleton
-        for i, name in enumerate(known.segments):
-            x, y, z = map(float, _JOINTS[part(name)])
-            side = -1.0 if known.side(name) == "l" else 1.0
-            parent = known.segments[known.parents[i]] if i else ""
-            origin = 0.48 if name == "upper_torso" else 0.0
-            length = _LENGTHS[part(name)] * (1.01 if side < 0 else 1.0)
-            joint = (name, parent, known.joints[i], known.joint_types[i], x, y, side * z)
-            sizes = (0.0, origin, 0.0, length, 0.97 * length, 0.004, 0.006, False)
-            rows.append((*joint, 0.0, 0.0, *sizes))
-        return frame(
-            "segment parent joint joint_type joint_x_m joint_y_m joint_z_m parent_tilt_rad "
-            "child_tilt_rad origin_x_m origin_y_m origin_z_m length_m first_guess_m length_sd_m "
-            "joint_shift_m held",
-            *rows,
-        )
-
     def markers(self) -> pd.DataFrame:
-        rows = []
-        for name in self.skeleton.segments:
-            for k, tip in enumerate(_TIPS.get(part(name), ((0.05, -0.1, 0.03),))):
-                label = EVIL if name == "forearm_r" else f"{name[:6].upper()}{name[-1]}{k}"
-                rows.append((label, name, *tip, 1.0, 0.004, 0.005))
-        return frame("marker segment x_m y_m z_m weight shift_m residual_m", *rows)
+        """One with a hostile name."""
+        table = _marker_table(self.skeleton, SAME, SAME)
+        return table.replace({"marker": {"RFA": EVIL}})
 
     def bsip(self) -> pd.DataFrame:
-        rows = []
+        readable = np.array([each.readable() for each in regress(PERSON, "M", MASS_KG).inertias])
+        share = np.tile(np.minimum(0.07 * (np.arange(15) + 0.5), 1.0)[:, None], 10)
+        tables = []
         for method in METHODS:
-            for k, name in enumerate(self.skeleton.segments):
-                row = {"method": method, "segment": name}
-                mass, length = MASS_KG * _SHARES[part(name)], _LENGTHS[part(name)]
-                values = [
-                    mass,
-                    0.01,
-                    -0.45 * length,
-                    0.0,
-                    *[mass * length**2 * f for f in (0.08, 0.02, 0.08)],
-                    0.0,
-                    0.0,
-                    0.0,
-                ]
-                if method == RM_MASS:
-                    values[0] *= MASS_FACTOR
-                if method == OM:
-                    values = [
-                        v + s * abs(v)
-                        for v, s in zip(values, self.random.normal(0, 0.08, 10), strict=True)
-                    ]
-                share = 0.0 if method != OM else min(1.0, 0.07 * (k + 0.5))
-                for column, value in zip(bsip_names(), values, strict=True):
-                    row |= {
-                        column: value,
-                        f"{column}_sd": 0.1 * abs(value) * (1 - 0.8 * share),
-                        share_name(column): share,
-                    }
-                rows.append(row)
-        return pd.DataFrame(rows)
+            values, known = readable.copy(), share * (method == OM)
+            if method == RM_MASS:
+                values[:, 0] *= MASS_FACTOR
+            if method == OM:
+                values += self.random.normal(0, 0.08, values.shape) * np.abs(values)
+            sd = 0.1 * np.abs(values) * (1 - 0.8 * known)
+            tables.append(bsip_table(method, self.skeleton.segments, values, sd, known))
+        return pd.concat(tables, ignore_index=True)
 
     def identification(self) -> pd.DataFrame:
         row = {
@@ -378,20 +326,10 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
 
 
 def marker_events() -> pd.DataFrame:
+    said = [f"RKNEL slips 15 mm on {EVIL}"] * 2
     return frame(
         "kind marker partner start_s end_s size_m statistic sentence what when put_right",
-        (
-            "slip",
-            "RKNEL",
-            "",
-            1.0,
-            2.0,
-            0.015,
-            9.0,
-            *[f"RKNEL slips 15 mm on {EVIL}"] * 2,
-            "",
-            False,
-        ),
+        ("slip", "RKNEL", "", 1.0, 2.0, 0.015, 9.0, *said, "", False),
     )
 
 
@@ -501,18 +439,6 @@ def changes() -> pd.DataFrame:
     table = frame(columns, ("thigh_l", 1.2, 0.015), ("foot_r", 0.001, 0.0002))
     shift = {f"com_{axis}_change_m": 0.0 for axis in "xyz"}
     return table.assign(method="OM+plate_rotation", **shift, largest="", sentence="")
-
-
-def empty(kind: str) -> pd.DataFrame:
-    """A table of the kind without rows."""
-    kinds = {"float": float, "int": "int64", "bool": bool, "text": object}
-    return pd.DataFrame(
-        {
-            c.name: pd.Series([], dtype=kinds[c.type])
-            for c in SCHEMAS[kind].columns
-            if not c.name.endswith("*")
-        }
-    )
 
 
 def svgs(html: str) -> list[bytes]:

@@ -326,15 +326,6 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
     assert EFFECT_WORDS[SOFT_TISSUE].follows.sentence in text
 
 
-def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
-    uneven = found[found["rank"] == 1].assign(
-        effect=UNNAMED, what="of unknown cause: plate 1 is turned, but not evenly"
-    )  # fmt: skip
-    text = text_of(uneven, detection(TRIALS))
-    assert "Of unknown cause: plate 1 is turned, but not evenly (95 %" in text
-    assert "It acts like force plate turned or tilted (plate 1); to check, push forwards" in text
-
-
 def test_what_an_error_of_unknown_cause_asks_to_check():
     """By what it goes along with, and in which component."""
     assert check_for("fz by load", ["error"]) == (

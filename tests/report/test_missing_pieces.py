@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from bsip_cli.report.blocks import (
     Bullets,
@@ -19,13 +18,7 @@ from bsip_cli.report.blocks import (
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
 from bsip_cli.running.freshness import why_stale
-from bsip_cli.stages.report import record_of
-from tests.report.fake_study import EVIL, Artifacts, empty, gains, pictures_of
-
-
-@pytest.fixture(scope="module")
-def record(reports) -> ParticipantRecord:
-    return record_of(reports.unit("report", reports.study.participants[0]))
+from tests.report.fake_study import EVIL, Artifacts, gains, pictures_of
 
 
 def with_trials(record: ParticipantRecord, **tables) -> ParticipantRecord:
@@ -110,24 +103,21 @@ def test_nothing_on_the_plates(record):
 def test_empty_tables(record):
     changed = replace(
         record,
-        excitation=empty("excitation"),
-        identification=empty("identification"),
-        diagnosis=empty("overall-diagnosis"),
-        detection=empty("detection"),
-        budget=empty("overall-error-budget"),
-        choice=empty("choice"),
+        excitation=record.excitation[:0],
+        identification=record.identification[:0],
+        diagnosis=record.diagnosis[:0],
+        detection=record.detection[:0],
+        budget=record.budget[:0],
+        choice=record.choice[:0],
         gains=gains()[:0],
     )
-    kinds = {
-        "quality": "quality",
-        "residuals": "marker-residuals",
-        "fit": "fit",
-        "reconstruction": "reconstruction",
-        "marker_events": "marker-events",
-        "joint_moments": "joint-moments",
-        "joint_peaks": "joint-peaks",
-    }
-    document = participant_document(with_trials(changed, **{k: empty(v) for k, v in kinds.items()}))
+    names = ("quality", "residuals", "fit", "reconstruction", "marker_events")
+    trials = []
+    for trial in record.trials:
+        moments = () if trial.joint_moments is None else ("joint_moments", "joint_peaks")
+        bare = {name: getattr(trial, name)[:0] for name in (*names, *moments)}
+        trials.append(replace(trial, **bare))
+    document = participant_document(replace(changed, trials=tuple(trials)))
     text = words_of(document)
     assert "excites the parameters was not computed" in text
     assert "Inconclusive No recording has motion" in text.replace("no rec", "No rec")

@@ -20,7 +20,6 @@ from bsip_cli.report.recordings import large_finding, light_for
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
 from bsip_cli.report.words import number, with_spread
-from bsip_cli.stages.report import record_of
 from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs
 
 FILE = "sub-01_task-static.c3d"
@@ -54,11 +53,6 @@ def text(page) -> str:
 @pytest.fixture(scope="module")
 def first(page) -> str:
     return words_of(page[page.index("<main") : page.index("</main>")])
-
-
-@pytest.fixture(scope="module")
-def record(reports) -> ParticipantRecord:
-    return record_of(reports.unit("report", reports.study.participants[0]))
 
 
 # --- the page -----------------------------------------------------------------------------------

@@ -34,7 +34,6 @@ from bsip_cli.report.recordings import (
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import cause_line, cause_text, consequences
 from bsip_cli.stages.diagnose_trial import rows_of
-from bsip_cli.stages.report import record_of
 from tests.report.fake_study import Artifacts, diagnosis
 
 STATIC = "sub-01_task-static"
@@ -42,11 +41,6 @@ SEQUENCE, BASKETBALL = "sub-01_task-sequence_run-1", "sub-01_task-basketball_run
 TRIALS = [SEQUENCE, BASKETBALL]
 FOUND = diagnosis(TRIALS)
 TURNED = FOUND[FOUND["rank"] == 1]
-
-
-@pytest.fixture(scope="module")
-def record(reports) -> ParticipantRecord:
-    return record_of(reports.unit("report", reports.study.participants[0]))
 
 
 def fault(effect: str, trials: str, **changes) -> pd.DataFrame:

@@ -43,17 +43,18 @@ def shared(**tables: pd.DataFrame) -> tuple[str, ...]:
     return shared_causes([searched(name, table, FACTS) for name, table in tables.items()])
 
 
-def test_a_cause_of_two_people_is_told_with_their_sizes():
-    (said,) = shared(ann=turned_by(0.035), bob=NOTHING, eve=turned_by(0.04))
-    assert said == (
-        "Force plate turned or tilted: plate 1: in 2 of 3 participants (ann and eve), 2.0 to "
-        "2.3°, equal within their intervals."
-    )
-
-
-def test_sizes_whose_intervals_lie_apart_differ():
-    (said,) = shared(ann=turned_by(0.035), eve=turned_by(0.07))
-    assert said.endswith("2.0 to 4.0°; the sizes differ by more than their intervals.")
+@pytest.mark.parametrize(
+    ("eve", "sizes"),
+    [
+        (turned_by(0.04), "2.0 to 2.3°, equal within their intervals."),
+        (turned_by(0.07), "2.0 to 4.0°; the sizes differ by more than their intervals."),
+        (turned_by(0.07, np.nan), "2.0 to 4.0°."),  # without an interval they are not compared
+    ],
+)
+def test_a_cause_of_two_people_is_told_with_their_sizes(eve, sizes):
+    (said,) = shared(ann=turned_by(0.035), bob=NOTHING, eve=eve)
+    where = "Force plate turned or tilted: plate 1: in 2 of 3 participants (ann and eve)"
+    assert said == f"{where}, {sizes}"
 
 
 def test_many_sizes_that_chance_spreads_may_be_the_same():
@@ -65,13 +66,13 @@ def test_many_sizes_that_chance_spreads_may_be_the_same():
     assert said.endswith(", equal within their intervals.")
 
 
-def test_sizes_without_intervals_are_not_compared():
-    (said,) = shared(ann=turned_by(0.035), eve=turned_by(0.07, np.nan))
-    assert said.endswith("2.0 to 4.0°.")
-
-
-def test_what_one_person_has_is_not_shared():
+def test_what_one_person_has_or_the_laboratory_tells_of_itself_is_not_shared():
     assert shared(ann=TURNED, bob=NOTHING) == ()
+    known = TURNED.assign(persons=2)
+    assert shared(ann=known, eve=known) == ()
+    blocks = diagnoses_section(cohort(ann=TURNED, eve=TURNED)).blocks
+    (said,) = (block for block in blocks if isinstance(block, Bullets))
+    assert len(said.items) == 1
 
 
 def test_twice_in_one_person_is_not_shared_but_counts_among_the_sizes():
@@ -150,12 +151,6 @@ def test_the_section_lists_causes_and_names_those_without():
     assert group[3].text == "96.0 %"
 
 
-def test_what_is_shared_stands_in_the_section():
-    blocks = diagnoses_section(cohort(ann=TURNED, eve=TURNED)).blocks
-    (said,) = (b for b in blocks if isinstance(b, Bullets))
-    assert len(said.items) == 1
-
-
 @pytest.mark.parametrize(
     ("states", "said"),
     [
@@ -197,8 +192,3 @@ def test_a_person_without_report_has_no_link():
     record = replace(record, members=(replace(record.members[0], has_report=False),))
     (grid,) = (b for b in diagnoses_section(record).blocks if isinstance(b, Grid))
     assert not grid.cells()[0][0].link
-
-
-def test_what_the_laboratory_tells_of_itself_is_not_shared_again():
-    known = TURNED.assign(persons=2)
-    assert shared(ann=known, eve=known) == ()

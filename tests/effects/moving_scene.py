@@ -1,4 +1,5 @@
-"""A person who moves all joints on two plates that measure exactly what the model predicts."""
+"""A person who moves all joints on two plates that measure exactly what the model predicts; and
+where and how large effects are tried on them."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ import pinocchio as pin
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Plate, Scene
 from tests.body.standing_person import Swing, parameters_of, standing
 
@@ -100,3 +102,16 @@ def continuous(q: np.ndarray, person: Person) -> np.ndarray:
 def rms(x: np.ndarray, ends: int = 20) -> np.ndarray:
     """(6,) over frames, without the trial's ends."""
     return np.sqrt((x[ends:-ends] ** 2).mean(axis=0))
+
+
+def some(effect: Effect, scene: Scene) -> list[str]:
+    """First, middle and last target."""
+    targets = effect.targets(scene)
+    assert targets
+    return sorted({targets[0], targets[len(targets) // 2], targets[-1]})
+
+
+def values_of(effect: Effect, scene: Scene, target: str, size: float) -> np.ndarray:
+    """``size`` times typical, at the middle of what is scanned."""
+    parameters = effect.parameters(scene, target)
+    return np.array([p.scan[len(p.scan) // 2] if p.scan else size * p.typical for p in parameters])

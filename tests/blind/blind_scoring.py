@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -116,18 +116,18 @@ class Score:
     kind: str
     place: str
     session: str
-    effect: str
-    size: float
-    unit: str
-    target: str
     verdict: str
     says: str
-    target_right: bool | None
-    targets: list[str]
-    wrong: list[str]
-    estimates: list[Estimate]
-    gain_percent: float | None
-    held_out_gain_percent: float | None
+    effect: str = NOTHING
+    size: float = 0.0
+    unit: str = ""
+    target: str = ""
+    target_right: bool | None = None
+    targets: list[str] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+    estimates: list[Estimate] = field(default_factory=list)
+    gain_percent: float | None = None
+    held_out_gain_percent: float | None = None
 
     def as_record(self) -> dict:
         return asdict(self)
@@ -159,24 +159,7 @@ def _quiet(case: str, kind: str, place: str, session: str, answers: list[Answer]
     wrong = [f"{alarm} ({_where(a)})" for a in answers for alarm in a.alarms()]
     if answers and not wrong:
         verdict = RIGHT_NAME
-    return Score(
-        case=case,
-        kind=kind,
-        place=place,
-        session=session,
-        effect=NOTHING,
-        size=0.0,
-        unit="",
-        target="",
-        verdict=verdict,
-        says=says,
-        target_right=None,
-        targets=[],
-        wrong=wrong,
-        estimates=[],
-        gain_percent=None,
-        held_out_gain_percent=None,
-    )
+    return Score(case, kind, place, session, verdict, says, wrong=wrong)
 
 
 def _score_of(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.stats import binomtest, norm
 
 from tests.blind.blind_cases import NOTHING
 from tests.blind.blind_running import write_atomically
@@ -24,7 +24,6 @@ from tests.blind.blind_scoring import (
     Estimate,
 )
 
-Z95 = 1.96
 HIDDEN_KINDS = ("single", "double", "outside")
 ESTIMATED = [field.name for field in fields(Estimate)]
 
@@ -212,10 +211,8 @@ def gains(scores: pd.DataFrame) -> pd.DataFrame:
 
 def wilson(count: int, total: int) -> tuple[float, float]:
     """95 % interval of a share (Wilson's score interval)."""
-    share, per = count / total, Z95**2 / total
-    middle = (share + per / 2) / (1 + per)
-    half = Z95 * np.sqrt(share * (1 - share) / total + per / (4 * total)) / (1 + per)
-    return max(0.0, middle - half), min(1.0, middle + half)
+    low, high = binomtest(count, total).proportion_ci(method="wilson")
+    return float(low), float(high)
 
 
 def markdown(table: pd.DataFrame) -> str:

@@ -6,7 +6,7 @@ parts of a trial; the diagnosis of forces on the body, z up, and of the file's c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ Z_UP = {"fx": 1.0, "fy": -1.0, "fz": -1.0, "mx": 1.0, "my": -1.0, "mz": -1.0}
 ASIDE = 0.15  # horizontal part of an unmeasured contact, of its vertical part
 IN_TRIAL = ("start", "end", "release_time", "from_time")  # times on one recording's clock
 Record = dict[str, Any]
+Mapping = Callable[[Record, Record], tuple[str, dict[str, float]]]
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,12 @@ def expected(record: Record, trial: Record) -> Expected:
     return Expected(effect, target, values)
 
 
-def _sized(name: str) -> Callable[[Record, Record], tuple[str, dict[str, float]]]:
+def _sized(name: str) -> Mapping:
     """An effect without place whose size is the parameter."""
     return lambda record, trial: ("", {name: record["size"]})
 
 
-def _channel(name: str, signed: bool) -> Callable[[Record, Record], tuple[str, dict[str, float]]]:
+def _channel(name: str, signed: bool) -> Mapping:
     def mapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
         sign = Z_UP[record["channel"]] if signed else 1.0
         return f"{_plate(record)} {record['channel']}", {name: sign * record["size"]}
@@ -65,7 +66,7 @@ def _crosstalk(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     return f"{_plate(record)} {source}>{sink}", {"coefficient": sign * record["size"]}
 
 
-def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Any:
+def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Mapping:
     return lambda record, trial: (place(record), dict(zip(names, record[field], strict=True)))
 
 
@@ -75,9 +76,7 @@ def _gravity(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
 
 
 def _added(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    places = zip("xyz", record["position_m"], strict=True)
-    positions = {f"position_{axis}": value for axis, value in places}
-    return record["segment"], {"mass": record["size"], **positions}
+    return record["segment"], {"mass": record["size"], **_xyz("position", record["position_m"])}
 
 
 def _released(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
@@ -99,29 +98,32 @@ def _breathing(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
 
 def _contact(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     """The horizontal part is drawn in the walkway's axes (X ahead, Y up, Z right)."""
-    begin = trial["recorded_from_s"]
-    length = trial["duration_s"] + begin
-    start, end = (share * length - begin for share in record["window_share"])
     heading = record["heading_rad"]
     walkway = np.array([ASIDE * np.cos(heading), 1.0, ASIDE * np.sin(heading)])
     force = record["size"] * np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
-    parts = {f"force_{axis}": float(x) for axis, x in zip("xyz", force, strict=True)}
     size = float(np.linalg.norm(force))
-    return record["segment"], {"start": start, "end": end, "force": size, **parts}
+    return record["segment"], {**_window(record, trial), "force": size, **_xyz("force", force)}
 
 
 def _pushed(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     walkway = record["size"] * np.array(record["direction"])
     force = np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
-    parts = {f"force_{axis}": float(x) for axis, x in zip("xyz", force, strict=True)}
-    return record["segment"], {"force": record["size"], **parts}
+    return record["segment"], {"force": record["size"], **_xyz("force", force)}
 
 
 def _handled(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    return record["segment"], {"mass": record["size"], **_window(record, trial)}
+
+
+def _window(record: Record, trial: Record) -> dict[str, float]:
+    """Of the movement, of which a delay may have cut the beginning off the recording."""
     begin = trial["recorded_from_s"]
-    length = trial["duration_s"] + begin
-    start, end = (share * length - begin for share in record["window_share"])
-    return record["segment"], {"mass": record["size"], "start": start, "end": end}
+    start, end = (share * (trial["duration_s"] + begin) - begin for share in record["window_share"])
+    return {"start": start, "end": end}
+
+
+def _xyz(name: str, vector: Iterable[float]) -> dict[str, float]:
+    return {f"{name}_{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
 
 
 def _implement(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
@@ -161,7 +163,7 @@ def _plate(record: Record) -> str:
     return str(record["plate"] or PLATE)
 
 
-MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = {
+MAPPINGS: dict[str, Mapping] = {
     "sync_offset": _sized("delay"),
     "clock_drift": _sized("rate_error"),
     "frame_rate": lambda record, trial: ("", {"rate_ratio": 1 + record["size"]}),

@@ -113,28 +113,11 @@ class FakeBatches:
             raise KeyboardInterrupt
         self.sessions.append(len(sessions))
         folder.mkdir(parents=True)
-        return Batch(tuple(quiet(case) for case in cases_of(sessions)), (), (1.0, 2.0))
-
-
-def quiet(case: Case) -> Score:
-    return Score(
-        case=case.name,
-        kind="null",
-        place=case.place,
-        session="session-001",
-        effect="none",
-        size=0.0,
-        unit="",
-        target="",
-        verdict=RIGHT_NAME,
-        says="none",
-        target_right=None,
-        targets=[],
-        wrong=[],
-        estimates=[],
-        gain_percent=None,
-        held_out_gain_percent=None,
-    )
+        scores = [
+            Score(case.name, "null", case.place, "session-001", RIGHT_NAME, "none")
+            for case in cases_of(sessions)
+        ]
+        return Batch(tuple(scores), (), (1.0, 2.0))
 
 
 def test_an_interrupted_suite_goes_on_and_writes_its_tables(tmp_path, monkeypatch):

@@ -36,7 +36,6 @@ from tests.blind.blind_tables import (
     false_positives,
     pairs,
     scores_frame,
-    wilson,
 )
 
 COLUMNS = (
@@ -48,13 +47,8 @@ SQUAT, HOPS = "sub-01_task-squat_run-2", "sub-01_task-hops_run-1"
 TRIAL = {"recorded_from_s": 0.0, "duration_s": 10.0}
 GAIN = {"effect": "plate_gain", "size": 0.04, "unit": "1", "channel": "fz", "plate": 0}
 DELAY = {"effect": "sync_offset", "size": 0.01, "unit": "s"}
-SHIFT = {
-    "effect": "plate_translation",
-    "size": 0.02,
-    "unit": "m",
-    "shift_m": [0.02, 0, 0],
-    "plate": 0,
-}
+SHIFT = {"effect": "plate_translation", "size": 0.02, "unit": "m", "plate": 0}
+SHIFT["shift_m"] = [0.02, 0, 0]
 TETHER = {"effect": "outside_elastic_tether", "size": 100.0, "unit": "N/m"}
 
 
@@ -83,28 +77,27 @@ def hidden(*records: dict, place: str = "squat", stems: tuple[str, ...] = (SQUAT
     return Recorded(case, "session-001", "sub-01", stems, truth)
 
 
+def told(out: Path, *records: dict, **where) -> Score:
+    """The one score of what is hidden."""
+    return only(score(out, hidden(*records, **where)))
+
+
 def only(scores: list[Score]) -> Score:
     assert len(scores) == 1
     return scores[0]
 
 
+def sized(parameter: str, unit: str, estimate: float, low: float, high: float) -> dict:
+    numbers = {"estimate": estimate, "ci_low": low, "ci_high": high}
+    return {"parameter": parameter, "unit": unit, **numbers}
+
+
 def test_a_named_effect_at_its_place_is_right(tmp_path):
-    diagnosis(
-        tmp_path,
-        SQUAT,
-        row(
-            "plate_gain",
-            target="1 fz",
-            parameter="gain",
-            estimate=0.045,
-            unit="1",
-            ci_low=0.03,
-            ci_high=0.05,
-            gain_percent=40.0,
-        ),
-        row("sync_offset", "rejected", rank=2, parameter="delay", estimate=0.5),
-    )
-    found = only(score(tmp_path, hidden(GAIN)))
+    size = sized("gain", "1", 0.045, 0.03, 0.05)
+    right = row("plate_gain", target="1 fz", gain_percent=40.0, **size)
+    rejected = row("sync_offset", "rejected", rank=2, parameter="delay", estimate=0.5)
+    diagnosis(tmp_path, SQUAT, right, rejected)
+    found = told(tmp_path, GAIN)
     assert (found.verdict, found.says, found.target_right) == (RIGHT_NAME, "plate_gain", True)
     assert not found.wrong and found.gain_percent == 40.0
     estimate = found.estimates[0]
@@ -114,7 +107,7 @@ def test_a_named_effect_at_its_place_is_right(tmp_path):
 
 def test_a_named_effect_elsewhere_has_the_wrong_target_and_no_estimate(tmp_path):
     diagnosis(tmp_path, SQUAT, row("plate_gain", target="1 fx", parameter="gain", estimate=0.04))
-    found = only(score(tmp_path, hidden(GAIN)))
+    found = told(tmp_path, GAIN)
     assert (found.verdict, found.target_right, found.targets) == (RIGHT_NAME, False, ["1 fx"])
     assert not found.estimates and found.gain_percent is None
     table = elsewhere(scores_frame([found.as_record()]))
@@ -127,45 +120,41 @@ def test_a_class_with_the_effect_is_right_and_one_without_is_wrong(tmp_path):
         row("sync_offset", "ambiguous", class_id="A", parameter="delay", estimate=0.011),
     ]
     diagnosis(tmp_path, SQUAT, *members)
-    found = only(score(tmp_path, hidden(DELAY)))
+    found = told(tmp_path, DELAY)
     assert (found.verdict, found.target_right) == (RIGHT_CLASS, True)
     assert found.estimates[0].estimate == 0.011 and np.isnan(found.estimates[0].ci_low)
-    missed = only(score(tmp_path, hidden(SHIFT)))
+    missed = told(tmp_path, SHIFT)
     assert (missed.verdict, missed.says) == (WRONG_CLASS, "gravity_tilt or sync_offset")
 
 
 @pytest.mark.parametrize(
     ("said", "verdict"),
-    [
-        ("none", MISSED),
-        ("unexplained", UNEXPLAINED),
-        ("breathing", WRONG_NAME),
-    ],
+    [("none", MISSED), ("unexplained", UNEXPLAINED), ("breathing", WRONG_NAME)],
 )
 def test_what_else_may_be_said_of_an_effect(tmp_path, said, verdict):
     diagnosis(tmp_path, SQUAT, row(said), row("sync_offset", "rejected", rank=2))
-    found = only(score(tmp_path, hidden(DELAY)))
+    found = told(tmp_path, DELAY)
     assert (found.verdict, found.says, found.target_right) == (verdict, said, None)
     assert bool(found.wrong) == (verdict == WRONG_NAME)
 
 
 def test_without_an_artifact_there_is_no_answer(tmp_path):
-    assert only(score(tmp_path, hidden(DELAY))).verdict == SILENT
-    assert only(score(tmp_path, hidden(place=SESSION))).verdict == SILENT
+    assert told(tmp_path, DELAY).verdict == SILENT
+    assert told(tmp_path, place=SESSION).verdict == SILENT
 
 
 def test_a_wrong_name_beside_the_right_one_is_kept(tmp_path):
     diagnosis(tmp_path, SQUAT, row("sync_offset"), row("breathing", rank=2))
-    found = only(score(tmp_path, hidden(DELAY)))
+    found = told(tmp_path, DELAY)
     assert found.verdict == RIGHT_NAME and found.wrong == ["breathing (task-squat_run-2)"]
 
 
 def test_a_twin_counts_where_nothing_tells_it_apart(tmp_path):
     diagnosis(tmp_path, SQUAT, row("plate_zero", target="1 fz"))
-    found = only(score(tmp_path, hidden(GAIN)))
+    found = told(tmp_path, GAIN)
     assert (found.verdict, found.says, found.wrong) == (RIGHT_CLASS, "plate_zero", [])
     diagnosis(tmp_path, HOPS, row("plate_zero", target="1 fz"))
-    hops = only(score(tmp_path, hidden(GAIN, place="hops", stems=(HOPS,))))
+    hops = told(tmp_path, GAIN, place="hops", stems=(HOPS,))
     assert (hops.verdict, hops.wrong) == (WRONG_NAME, ["plate_zero (task-hops_run-1)"])
 
 
@@ -197,8 +186,8 @@ def test_what_hangs_on_the_movement_is_that_of_the_longest_recording_told_of(tmp
     for stem, seconds, bent in ((SQUAT, 10.0, 0.5), (HOPS, 5.0, 0.2)):
         whole.truth["trials"][stem] = {"duration_s": seconds, "missing_joint_range_rad": bent}
     said = {"target": "upper_torso", "parameter": "flexion", "estimate": 0.3}
-    for told, truth in ((HOPS, 0.2), (f"{HOPS}, {SQUAT}", 0.5)):
-        diagnosis(tmp_path, "sub-01", row("missing_joint", **said, trials=told))
+    for stems, truth in ((HOPS, 0.2), (f"{HOPS}, {SQUAT}", 0.5)):
+        diagnosis(tmp_path, "sub-01", row("missing_joint", **said, trials=stems))
         assert only(score(tmp_path, whole)).estimates[0].truth == truth
 
 
@@ -210,18 +199,18 @@ def test_errors_are_told_in_units_of_the_bound_of_their_recording(tmp_path):
     ]
     diagnosis(tmp_path, "sub-01", row("none"), causes=causes)
     diagnosis(tmp_path, SQUAT, row("sync_offset", parameter="delay", estimate=0.0101))
-    found = only(score(tmp_path, hidden(DELAY)))
+    found = told(tmp_path, DELAY)
     assert found.estimates[0].bound == 0.0005
     table = accuracy(estimates_frame(scores_frame([found.as_record()])))
     assert table["errors / bound"][0] == pytest.approx(0.2 / 0.6745, rel=1e-3)
     diagnosis(tmp_path, "sub-01", row("none"), causes=causes[:1])
-    assert only(score(tmp_path, hidden(DELAY))).estimates[0].bound is None
+    assert told(tmp_path, DELAY).estimates[0].bound is None
 
 
 def test_the_person_has_no_say_about_an_effect_of_one_trial(tmp_path):
     diagnosis(tmp_path, "sub-01", row("sync_offset"))
     diagnosis(tmp_path, SQUAT, row("none"))
-    assert only(score(tmp_path, hidden(DELAY))).verdict == MISSED
+    assert told(tmp_path, DELAY).verdict == MISSED
 
 
 def test_each_of_two_effects_has_its_own_verdict(tmp_path):
@@ -257,7 +246,7 @@ def test_outside_the_catalogue_a_name_is_wrong_whatever_stands_beside(tmp_path):
 def test_a_null_is_quiet_or_has_a_false_positive(tmp_path, rows, verdict, says):
     diagnosis(tmp_path, "sub-01", row("none"))
     diagnosis(tmp_path, SQUAT, *rows)
-    null = only(score(tmp_path, hidden(place=SESSION)))
+    null = told(tmp_path, place=SESSION)
     clean = score_of_clean_trial(tmp_path, "sub-01", "session-001", SQUAT)
     assert (null.verdict, null.says) == (clean.verdict, clean.says) == (verdict, says)
     assert bool(null.wrong) == (verdict != RIGHT_NAME)
@@ -266,26 +255,12 @@ def test_a_null_is_quiet_or_has_a_false_positive(tmp_path, rows, verdict, says):
 
 
 def test_a_shift_of_a_marker_is_compared_by_its_length(tmp_path):
-    slipped = {
-        "effect": "marker_shift",
-        "size": 0.03,
-        "unit": "m",
-        "marker": "C7",
-        "from_share": 0.4,
-        "from_s": None,
-    }
+    slip = {"effect": "marker_shift", "size": 0.03, "unit": "m", "marker": "C7"}
+    slipped = {**slip, "from_share": 0.4, "from_s": None}
     shift = row("marker_shift", target="C7", parameter="shift", estimate=0.028, unit="m")
-    moment = row(
-        "marker_shift",
-        target="C7",
-        parameter="from_time",
-        estimate=4.1,
-        unit="s",
-        ci_low=3.9,
-        ci_high=4.2,
-    )
+    moment = row("marker_shift", target="C7", **sized("from_time", "s", 4.1, 3.9, 4.2))
     diagnosis(tmp_path, SQUAT, shift, moment)
-    frame = estimates_frame(scores_frame([only(score(tmp_path, hidden(slipped))).as_record()]))
+    frame = estimates_frame(scores_frame([told(tmp_path, slipped).as_record()]))
     assert frame["parameter"].tolist() == ["shift", "from_time"]
     np.testing.assert_allclose(frame["estimate"], [0.028, 4.1])
     np.testing.assert_allclose(frame["truth"], [0.03, 4.0])
@@ -308,33 +283,22 @@ def test_repeated_frames_that_are_gaps_are_noted(tmp_path):
     diagnosis(tmp_path, SQUAT, row("none"))
     lines = pd.DataFrame({"check": ["markers", "repeated_frames"]})
     lines[:1].to_parquet(tmp_path / "sub-01" / f"{SQUAT}_quality.parquet")
-    assert only(score(tmp_path, hidden(repeated))).verdict == MISSED
+    assert told(tmp_path, repeated).verdict == MISSED
     lines.to_parquet(tmp_path / "sub-01" / f"{SQUAT}_quality.parquet")
-    assert only(score(tmp_path, hidden(repeated))).verdict == PUT_RIGHT
+    assert told(tmp_path, repeated).verdict == PUT_RIGHT
 
 
 def test_the_gain_artifact_beside_the_answer_is_averaged(tmp_path):
     diagnosis(tmp_path, SQUAT, row("sync_offset", gain_percent=30.0))
     gains = pd.DataFrame({"component": ["fx", "fz"], "gain_percent": [10.0, 30.0]})
     gains.to_parquet(tmp_path / "sub-01" / f"{SQUAT}_gain.parquet")
-    found = only(score(tmp_path, hidden(DELAY)))
+    found = told(tmp_path, DELAY)
     assert (found.gain_percent, found.held_out_gain_percent) == (30.0, 20.0)
 
 
 def test_all_tables_of_a_mixed_bag(tmp_path):
-    diagnosis(
-        tmp_path,
-        SQUAT,
-        row(
-            "sync_offset",
-            parameter="delay",
-            estimate=0.012,
-            unit="s",
-            ci_low=0.011,
-            ci_high=0.013,
-            gain_percent=12.0,
-        ),
-    )
+    size = sized("delay", "s", 0.012, 0.011, 0.013)
+    diagnosis(tmp_path, SQUAT, row("sync_offset", gain_percent=12.0, **size))
     cases = [hidden(DELAY), hidden(SHIFT), hidden(), hidden(TETHER), hidden(DELAY, SHIFT)]
     scores = [
         replace(one, case=f"case-{k}") for k, c in enumerate(cases) for one in score(tmp_path, c)
@@ -346,9 +310,3 @@ def test_all_tables_of_a_mixed_bag(tmp_path):
     assert "| sync_offset | delay | s | 2 | 0.01 | 0.002 | 0 | 0.002 |  | 0 of 2 |" in text
     assert "| one trial |" not in text and "100.0% (20.7% to 100.0%)" in text
     assert "| outside_elastic_tether | 1 |" in text
-
-
-def test_an_interval_of_a_share():
-    low, high = wilson(2, 40)
-    assert (round(low, 3), round(high, 3)) == (0.014, 0.165)
-    assert wilson(0, 40)[0] == 0.0 and wilson(40, 40)[1] == 1.0

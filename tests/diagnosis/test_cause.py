@@ -1,17 +1,54 @@
-"""A cause's change frame by frame, with the sizes that the frame did not help to find."""
+"""A cause's change frame by frame, with sizes that the frame did not help to find; and forces put
+right."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
-from bsip_cli.diagnosis.cause import Blocks, Cause, change_by, method_of, unseen_change_by
-from bsip_cli.effects.plates import PlateZero, SyncOffset
+from bsip_cli.diagnosis.cause import (
+    Blocks,
+    Cause,
+    change_by,
+    corrected_plates,
+    corrected_wrench,
+    is_of_the_forces,
+    method_of,
+    unseen_change_by,
+)
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.loads import AddedMass
+from bsip_cli.effects.plates import ClockDrift, Delay, PlateRotation, PlateZero, SyncOffset
+from bsip_cli.effects.scene import Scene
 from tests.effects.moving_scene import moving
 
+
+def cause_of(effect: Effect, target: str, *values: float) -> Cause:
+    return Cause(effect, target, ("a",), np.array(values), np.array([values] * 5))
+
+
+OFFSET = cause_of(PlateZero(), "1 fz", 30.0)
+LATE = cause_of(SyncOffset(), "", 0.034)
+SLOW = cause_of(ClockDrift(), "", 0.004)
 BLOCKS = Blocks(first=3, start_s=0.1, block_s=2.0, folds=5)
-FOLDS = np.array([[10.0], [20.0], [30.0], [40.0], [50.0]])
-OFFSET = Cause(PlateZero(), "1 fz", ("a",), np.array([25.0]), FOLDS)
+
+
+def largest(wrench: np.ndarray) -> np.ndarray:
+    """(6,)."""
+    return np.abs(wrench).max(axis=0)
+
+
+def late(scene: Scene, *causes: Cause) -> np.ndarray:
+    """(N, 6) true wrench as it is recorded late."""
+    late_s = np.zeros(len(scene.times_s))
+    for cause in causes:
+        assert isinstance(cause.effect, Delay)
+        late_s += cause.effect.late_s(scene, cause.values)
+    return CubicSpline(scene.times_s, scene.predicted)(scene.times_s - late_s)
 
 
 def test_block_and_fold_of_a_time():
@@ -21,14 +58,82 @@ def test_block_and_fold_of_a_time():
 
 
 def test_every_frame_has_the_sizes_of_its_own_fold():
-    scene = moving()
+    scene, sizes = moving(), np.array([[10.0], [20.0], [30.0], [40.0], [50.0]])
     fold = BLOCKS.fold_of(scene.times_s)
-    change = unseen_change_by([OFFSET], scene, fold)
-    assert change[:, 2] == pytest.approx(FOLDS[fold, 0])
-    assert change_by([OFFSET], scene)[:, 2] == pytest.approx(25.0)
+    change = unseen_change_by([replace(OFFSET, folds=sizes)], scene, fold)
+    assert change[:, 2] == pytest.approx(sizes[fold, 0])
+    assert change_by([OFFSET], scene)[:, 2] == pytest.approx(30.0)
 
 
 def test_name_of_the_extended_model():
-    delay = Cause(SyncOffset(), "", ("a",), np.array([0.01]), np.full((5, 1), 0.01))
-    assert method_of([delay]) == "OM+sync_offset"
-    assert method_of([delay, OFFSET]) == "OM+sync_offset+plate_zero"
+    assert method_of([LATE]) == "OM+sync_offset"
+    assert method_of([LATE, OFFSET]) == "OM+sync_offset+plate_zero"
+
+
+def test_a_plate_is_put_right_exactly():
+    scene = moving()
+    measured = scene.predicted + change_by([OFFSET], scene)
+    wrench, valid = corrected_wrench(scene, measured, [OFFSET])
+    assert wrench == pytest.approx(scene.predicted, abs=1e-9)
+    assert valid.all()
+
+
+@pytest.mark.parametrize("causes", [(LATE,), (SLOW,), (LATE, SLOW), (OFFSET, LATE)])
+def test_a_late_clock_is_put_right(causes):
+    scene = moving()
+    clocks = [cause for cause in causes if cause is not OFFSET]
+    measured = late(scene, *clocks)
+    if OFFSET in causes:
+        measured = measured + change_by([OFFSET], scene)
+    wrench, valid = corrected_wrench(scene, measured, causes)
+    left, before = (largest((x - scene.predicted)[valid]) for x in (wrench, measured))
+    assert (left < 5e-3 * before).all()
+    assert 0.95 < valid.mean() < 1  # what was recorded after the end is not there
+
+
+def test_frames_beside_a_gap_are_not_valid_after_the_shift():
+    scene = moving()
+    valid = np.ones(len(scene.times_s), dtype=bool)
+    valid[300:320] = False
+    measured = np.where(valid[:, None], late(scene, LATE), 0.0)
+    wrench, kept = corrected_wrench(replace(scene, valid=valid), measured, [LATE])
+    moved = round(0.034 * scene.rate_hz)
+    assert not kept[300 - moved : 318 - moved].any()
+    assert kept[200:290].all()
+    left, before = (largest((x - scene.predicted)[210:280]) for x in (wrench, measured))
+    assert (left < 5e-3 * before).all()
+
+
+def test_only_forces_are_put_right():
+    """What a person carries is truly on the plate."""
+    carried = cause_of(AddedMass(), "hand_r", 1.0, 0.0, 0.0, 0.0)
+    assert not is_of_the_forces(carried)
+    assert all(is_of_the_forces(cause) for cause in (OFFSET, LATE, SLOW))
+
+
+def test_plates_that_turned_together_turn_about_the_middle_of_all():
+    scene = moving()
+    turned = cause_of(PlateRotation(), "all", 0.0, 0.02, 0.1)
+    found = corrected_plates(scene, [turned])
+    whole, _ = corrected_wrench(scene, scene.measured, [turned])
+    assert sum(found.values()) == pytest.approx(whole, abs=1e-9)
+    middle = np.mean([plate.centre_m() for plate in scene.plates], axis=0)
+    for plate in scene.plates:
+        turn = Rotation.from_rotvec([0.0, 0.02, 0.1]).as_matrix().T
+        force = plate.wrench[:, :3] @ turn
+        moment = (plate.wrench[:, 3:] - np.cross(middle, plate.wrench[:, :3])) @ turn
+        assert found[plate.name][:, :3] == pytest.approx(force, abs=1e-9)
+        assert found[plate.name][:, 3:] == pytest.approx(moment + np.cross(middle, force), abs=1e-9)
+
+
+def test_a_plate_is_freed_of_its_own_faults_only():
+    scene = moving()
+    first, second = scene.plates
+    lost = first.wrench.copy()
+    lost[5] = np.nan
+    scene = replace(scene, plates=(replace(first, wrench=lost), second))
+    found = corrected_plates(scene, [OFFSET])
+    assert np.isnan(found["1"][5]).all()
+    change = np.delete(found["1"] - first.wrench, 5, axis=0)
+    assert change[:, 2] == pytest.approx(-30.0, abs=1e-9)
+    assert np.array_equal(found[second.name], second.wrench)

@@ -1,4 +1,4 @@
-"""Hands that hold on to something: both signs are needed, and the force is what the plates miss."""
+"""What lies beside the plates: hands that hold on to something, and a stated mass that is wrong."""
 
 from __future__ import annotations
 
@@ -6,9 +6,23 @@ import json
 from dataclasses import asdict, replace
 
 import numpy as np
+import pytest
 
-from bsip_cli.diagnosis.support import Support, held_by, support_of
-from tests.effects.moving_scene import moving
+from bsip_cli.diagnosis.findings import Finding
+from bsip_cli.diagnosis.support import (
+    CLASS,
+    Support,
+    agreed_share,
+    held_by,
+    loaded_plate,
+    stated_mass_findings,
+    support_of,
+    weight_share,
+)
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
+from tests.diagnosis.noisy_trial import noisy, part_of_moving, with_effect
+from tests.effects.moving_scene import MASS_KG, moving, standing_still
 
 WEIGHT_N = 650.0
 TIMES_S = np.arange(1000) / 100.0
@@ -54,16 +68,13 @@ def test_one_hand_on_a_rail():
     assert found is not None and found.hands == ("hand_r",)
 
 
-def test_still_hands_alone_are_no_contact():
-    assert held(0.001, 0.001, 0.016, np.zeros(3)) is None
-
-
-def test_a_missing_force_alone_is_no_hand():
-    assert held(0.02, 0.02, 0.02, FORCE_N) is None
-
-
-def test_who_stands_still_altogether_does_not_hold_on():
-    assert held(0.004, 0.004, 0.005, FORCE_N) is None
+@pytest.mark.parametrize(
+    ("hands_m", "trunk_m", "force_N"),
+    [(0.001, 0.016, 0 * FORCE_N), (0.02, 0.02, FORCE_N), (0.004, 0.005, FORCE_N)],
+    ids=["still hands alone", "a missing force alone", "who stands still altogether"],
+)
+def test_what_is_no_hand_that_holds_on(hands_m, trunk_m, force_N):
+    assert held(hands_m, hands_m, trunk_m, force_N) is None
 
 
 def test_who_moves_freely_does_not_hold_on_whatever_the_plates_say():
@@ -84,3 +95,75 @@ def test_what_was_found_survives_being_written():
     assert found is not None
     again = Support(**json.loads(json.dumps(asdict(found))))
     assert again.finding("trial") == found.finding("trial") and again.words() == found.words()
+
+
+# --- the stated mass ---
+
+MASS_SD = 0.008
+
+
+def told(share: float, mass_sd: float = MASS_SD) -> tuple[Finding, ...]:
+    """Of plates that read so much more than the stated mass weighs."""
+    scene = standing_still()
+    scene = replace(scene, wrench=(1 + share) * scene.predicted)
+    said = (None, ("standing",), "in quiet stance")
+    return stated_mass_findings(weight_share(scene), scene.mass_kg, mass_sd, *said)
+
+
+@pytest.mark.parametrize("share", [0.06, -0.04])
+def test_plates_that_read_otherwise_make_a_class(share):
+    found = told(share)
+    sizes = {one.effect: one.numbers[0].value for one in found}
+    assert abs(sizes["plate_gain"] - share) < 1e-9
+    assert abs(sizes["plate_zero"] - share * MASS_KG * 9.81) < 0.05
+    if share > 0:
+        assert abs(sizes["added_mass"] - share * MASS_KG) < 1e-6
+    else:
+        assert "added_mass" not in sizes  # nobody wears a negative mass
+    assert all((one.verdict, one.class_id) == ("ambiguous", CLASS) for one in found)
+    assert all(one.p_value < 1e-5 and np.isnan(one.gain[0]) for one in found)
+    assert all("the stated mass is wrong" in one.sentence for one in found)
+
+
+def test_plates_that_agree_say_nothing():
+    assert told(0.01) == ()
+
+
+def test_only_one_plate_carries_the_person_or_none_does_alone():
+    scene = standing_still()
+    assert loaded_plate([scene]) is None
+    first, second = scene.plates
+    alone = replace(second, wrench=0 * second.wrench)
+    on_one = replace(scene, plates=(first, alone))
+    assert loaded_plate([on_one, on_one]) == "1"
+    assert loaded_plate([on_one, scene]) is None
+
+
+def on_one_plate(gain: float, first_s: float) -> Scene:
+    """A moving trial on the first of two plates, whose vertical channel is off."""
+    scene = part_of_moving(first_s, 4.0)
+    first, second = scene.plates
+    plates = (
+        replace(first, wrench=scene.predicted),
+        replace(second, wrench=0 * scene.predicted),
+    )
+    alone = replace(scene, plates=plates)
+    return noisy(with_effect(alone, EFFECTS["plate_gain"], "1 fz", gain), round(first_s))
+
+
+def test_moving_trials_that_agree_tell_what_the_plates_read():
+    scenes = [on_one_plate(0.05, 0), on_one_plate(0.05, 4)]
+    assert agreed_share(scenes, MASS_SD) == pytest.approx(0.05 / 1.05, abs=0.003)
+
+
+@pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])
+def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
+    assert agreed_share([on_one_plate(gains[0], 0), on_one_plate(gains[1], 4)], MASS_SD) is None
+
+
+def test_a_scale_that_errs_more_says_less():
+    assert told(0.03, 2 * MASS_SD) == ()
+    assert told(0.03)[0].numbers[0].high < (0.03 + 2 * MASS_SD) * MASS_KG
+    scenes = [on_one_plate(0.03, 0), on_one_plate(0.03, 4)]
+    assert agreed_share(scenes, MASS_SD) == pytest.approx(0.03 / 1.03, abs=0.003)
+    assert agreed_share(scenes, 2 * MASS_SD) is None

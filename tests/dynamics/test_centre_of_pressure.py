@@ -1,7 +1,10 @@
+"""Where the force acts on the ground, and the frames over which methods are compared there."""
+
 import numpy as np
 import pytest
 
 from bsip_cli.dynamics.ground_wrench import anterior_and_right, centre_of_pressure
+from bsip_cli.stages.reconstruct import over_the_same_frames
 
 
 def wrench_at(point, force, free_moment=0.0):
@@ -41,3 +44,24 @@ def test_anterior_up_and_right_are_a_right_handed_frame(heading):
     forward, sideways = anterior_and_right(points, anterior)
     np.testing.assert_allclose(forward, [1.0, 0.0, 0.3], atol=1e-12)
     np.testing.assert_allclose(sideways, [0.0, 1.0, -0.2], atol=1e-12)
+
+
+def signals(cop):
+    return {"cop_ap": np.array(cop), "cop_ml": np.array(cop), "fz": np.array([700.0, 210.0, 800.0])}
+
+
+def test_a_frame_without_one_methods_cop_is_compared_in_none():
+    """RM's force is just too small in the second frame, where all others err by far."""
+    found = over_the_same_frames(
+        {
+            "measured": signals([0.0, 0.0, 0.0]),
+            "RM": signals([0.01, np.nan, 0.01]),
+            "RM+mass": signals([0.01, 0.3, 0.01]),
+            "OM": signals([0.02, 0.4, 0.02]),
+            "base": signals([0.02, 0.4, np.nan]),
+        }
+    )
+    for method, errors in {"RM+mass": [0.01, np.nan, 0.01], "OM": [0.02, np.nan, 0.02]}.items():
+        assert found[method]["cop_ap"] == pytest.approx(errors, nan_ok=True)
+    assert np.isfinite(found["measured"]["cop_ml"]).tolist() == [True, False, True]
+    assert found["OM"]["fz"].tolist() == [700.0, 210.0, 800.0]

@@ -23,7 +23,16 @@ from bsip_cli.effects.markers import CORNER, MarkerShift, MarkerSwap, OverSmooth
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import marker_residuals, solve_trial
 from tests.body.standing_person import markers_of, standing
-from tests.effects.moving_scene import RATE_HZ, derivatives, moving, phi, rms, scene_of
+from tests.effects.moving_scene import (
+    RATE_HZ,
+    continuous,
+    derivatives,
+    moving,
+    phi,
+    quaternions,
+    rms,
+    scene_of,
+)
 
 PERSON = standing().person
 LIMIT_M = 0.025
@@ -45,27 +54,10 @@ def followed(markers: np.ndarray, limit_m: float = 1.0, smooth_s: float = 0.0) -
 
 
 def smoothed(q: np.ndarray, sd_s: float) -> np.ndarray:
-    q = q.copy()
-    for at in quaternions():
-        signs = np.sign(np.einsum("fi,fi->f", q[1:, at], q[:-1, at]))
-        q[1:, at] *= np.cumprod(signs)[:, None]
-    return unit(gaussian_filter1d(q, sd_s * RATE_HZ, axis=0))
-
-
-def unit(q: np.ndarray) -> np.ndarray:
-    for at in quaternions():
+    q = gaussian_filter1d(continuous(q, PERSON), sd_s * RATE_HZ, axis=0)
+    for at in quaternions(PERSON):
         q[:, at] /= np.linalg.norm(q[:, at], axis=1, keepdims=True)
     return q
-
-
-def quaternions() -> list[slice]:
-    skeleton = PERSON.skeleton
-    offset = {"free": 3, "spherical": 0}
-    return [
-        slice(at + offset[kind], at + offset[kind] + 4)
-        for at, kind in zip(skeleton.q_starts, skeleton.joint_types, strict=True)
-        if kind in offset
-    ]
 
 
 def explained(change: np.ndarray, truth: np.ndarray) -> np.ndarray:

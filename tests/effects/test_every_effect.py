@@ -7,11 +7,11 @@ import pytest
 
 from bsip_cli.effects.body import WobblingMass
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
+from bsip_cli.effects.nameless import NAMELESS
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import marker_residuals
 from tests.body.standing_person import standing
-from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
-from tests.effects.moving_scene import moving
+from tests.effects.moving_scene import moving, some, values_of
 
 VOCABULARY = """
 sync_offset clock_drift frame_rate plate_translation plate_rotation plate_gain plate_crosstalk
@@ -21,6 +21,7 @@ segment_inertia implement camera_frame external_force object_handled marker_slid
 """
 UNITS = {"m", "rad", "1", "s", "Hz", "kg", "kg m", "kg m2", "N", "N m", "N/s", "N m/s"}
 EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]
+NAMELESS_TOO = [*EVERY, *(pytest.param(one, id=type(one).__name__) for one in NAMELESS)]
 
 
 def scene_with_swapped_markers() -> Scene:
@@ -51,7 +52,7 @@ def test_the_catalogue_is_the_vocabulary():
     assert [effect.name for effect in CATALOGUE] == VOCABULARY.split() == list(EFFECTS)
 
 
-@pytest.mark.parametrize("effect", EVERY)
+@pytest.mark.parametrize("effect", NAMELESS_TOO)
 def test_nothing_changes_at_the_null(effect, scene):
     for target in some(effect, scene):
         values = values_of(effect, scene, target, 0.0)
@@ -62,10 +63,26 @@ def test_nothing_changes_at_the_null(effect, scene):
         assert moved is None or (moved.shape == scene.markers_m.shape and not moved.any())
 
 
-@pytest.mark.parametrize("effect", EVERY)
+@pytest.mark.parametrize("effect", NAMELESS_TOO)
 @pytest.mark.parametrize("size", [0.0, 1.0])
 def test_the_tangent_is_the_derivative(effect, scene, size):
-    assert_tangent_is_the_derivative(effect, scene, size)
+    """By differences of fourth order, at ``size`` times typical."""
+    for target in some(effect, scene):
+        values = values_of(effect, scene, target, size)
+        tangent = effect.tangent(scene, target, values)
+        at = [k for k, p in enumerate(effect.parameters(scene, target)) if not p.scan]
+        assert tangent.shape == (*scene.predicted.shape, len(at))
+        for column, k in enumerate(at):
+            step = np.zeros(len(values))
+            step[k] = 1e-2 * effect.parameters(scene, target)[k].typical
+
+            def moved(n, target=target, values=values, step=step):
+                return effect.change(scene, target, values + n * step)
+
+            far, near = moved(2) - moved(-2), moved(1) - moved(-1)
+            expected = (8 * near - far) / (12 * step[k])
+            scale = max(float(np.abs(expected).max()), 1e-9)
+            np.testing.assert_allclose(tangent[..., column], expected, atol=1e-4 * scale)
 
 
 @pytest.mark.parametrize("effect", EVERY)

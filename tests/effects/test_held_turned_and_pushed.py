@@ -12,7 +12,7 @@ from bsip_cli.body.inertia import Inertia
 from bsip_cli.effects.frames import CameraFrame
 from bsip_cli.effects.loads import CENTRE_M, ExternalForce, Implement, ObjectHandled, centre_m
 from bsip_cli.effects.scene import Scene
-from tests.effects.moving_scene import moving, rms, standing_still
+from tests.effects.moving_scene import moving, phi_with, rms, standing_still
 
 G = 9.80665
 CLUB = np.array([0.25, 1.0, 0.4, -0.3, 4 / 3])  # 0.33 kg, 0.75 m from the hand
@@ -21,13 +21,11 @@ CLUB = np.array([0.25, 1.0, 0.4, -0.3, 4 / 3])  # 0.33 kg, 0.75 m from the hand
 def test_an_implement_is_another_body_of_the_hand():
     scene = moving()
     hand = scene.person.skeleton.index("hand_r")
-    part = slice(10 * scene.bodies.index("hand_r"), 10 * scene.bodies.index("hand_r") + 10)
     axis, distance = centre_m(CLUB) / 0.75, 0.75
     place = scene.person.origin_in_joint_m[hand] + scene.centre_of("hand_r") + distance * axis
     mass = CLUB[0] / distance
     tensor = mass * distance**2 / 3 * (np.eye(3) - np.outer(axis, axis))
-    heavier = scene.phi.copy()
-    heavier[part] += Inertia(mass, place, tensor).phi()
+    heavier = phi_with(scene, "hand_r", Inertia(mass, place, tensor).phi())
     expected = scene.wrench_of(heavier) - scene.predicted
     np.testing.assert_allclose(Implement().change(scene, "hand_r", CLUB), expected, atol=1e-8)
     told = {name: value for name, _, value in Implement().reported(scene, "hand_r", CLUB)}
@@ -68,9 +66,8 @@ def test_hands_that_touch_throughout_may_hold_one_thing():
     turn = scene.motion.rotation[0, right]
     # The same person with a right hand whose origin lies 5 cm beside the left hand's centre.
     origins[right] += turn.T @ (apart[0] - apart[1] + [0.0, 0.0, 0.05])
-    phi = scene.phi.copy()
-    k = 10 * scene.bodies.index("hand_r")
-    phi[k + 1 : k + 4] += phi[k] * (origins - scene.person.origin_in_joint_m)[right]
+    moment = scene.phi[10 * right] * (origins - scene.person.origin_in_joint_m)[right]
+    phi = phi_with(scene, "hand_r", np.concatenate([[0.0], moment, np.zeros(6)]))
     near = replace(scene, phi=phi, person=replace(scene.person, origin_in_joint_m=origins))
     assert Implement().targets(near)[-1] == "hand_l+hand_r"
 

@@ -11,7 +11,7 @@ from bsip_cli.effects.nameless import NAMELESS, Course, Mean, in_channel, signal
 from bsip_cli.effects.plates import CHANNELS
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 from tests.diagnosis.noisy_trial import part_of_moving
-from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
+from tests.effects.moving_scene import some, values_of
 
 EVERY = [pytest.param(one, id=type(one).__name__) for one in NAMELESS]
 AWAY_M = np.array([3.0, -2.0, 0.0])
@@ -25,24 +25,11 @@ def scene() -> Scene:
 
 
 @pytest.mark.parametrize("pattern", EVERY)
-def test_nothing_at_the_null_and_more_with_the_size(pattern, scene):
-    for target in some(pattern, scene):
-        none, one = (
-            pattern.change(scene, target, values_of(pattern, scene, target, k)) for k in (0, 1)
-        )
-        np.testing.assert_allclose(none, 0, atol=1e-8)
-        assert np.abs(one).max() > 0.1
-
-
-@pytest.mark.parametrize("pattern", EVERY)
-@pytest.mark.parametrize("size", [0.0, 1.0])
-def test_the_tangent_is_the_derivative(pattern, scene, size):
-    assert_tangent_is_the_derivative(pattern, scene, size)
-
-
-@pytest.mark.parametrize("pattern", EVERY)
-def test_a_step_below_the_least_size_is_still_finite(pattern, scene):
+def test_a_size_is_seen_and_a_step_below_the_least_is_still_finite(pattern, scene):
     """As derivatives by scanned values ask, which step by a tenth of the typical size."""
+    for target in some(pattern, scene):
+        change = pattern.change(scene, target, values_of(pattern, scene, target, 1.0))
+        assert np.abs(change).max() > 0.1
     target = pattern.targets(scene)[0]
     parameters = pattern.parameters(scene, target)
     values = values_of(pattern, scene, target, 1.0)

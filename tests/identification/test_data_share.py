@@ -1,7 +1,5 @@
 """What the data can know beside the table, and how it is said."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -44,14 +42,6 @@ def test_what_the_estimators_say_where_the_data_are_strong():
     own = readable(estimate(sharp), sharp.prior).share
     assert (own > 0.95).sum() > 30
     np.testing.assert_allclose(share[own > 0.95], own[own > 0.95], atol=0.05)
-
-
-def test_data_that_are_trusted_less_decide_less():
-    means = []
-    for ratio in (1.0, 4.0):
-        information, _ = replace(problem(), trust_ratio=ratio).trusted_equations()
-        means.append(beforehand(problem()).share(information).mean())
-    assert means[1] < means[0] - 0.05
 
 
 def test_combinations_that_the_data_know():

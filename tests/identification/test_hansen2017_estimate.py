@@ -106,8 +106,7 @@ def test_masses_stay_positive_where_the_nearest_would_not_be():
 
 def test_almost_no_data_leave_rm():
     rows = regressor()[:3]
-    problem = problem_of(rows, rows @ world().phi_true, 1e7)
-    found = estimate(problem)
+    found = estimate(problem_of(rows, rows @ world().phi_true, 1e7))
     np.testing.assert_array_equal(found.phi, world().prior.phi)
     read = readable(found, world().prior)
     np.testing.assert_allclose(read.share, 0.0, atol=1e-6)
@@ -128,10 +127,9 @@ def test_shares_grow_with_the_data_and_stay_within_bounds():
     assert means[-1] < 0.999  # the wrench cannot show all, whatever the noise
 
 
-def test_what_the_wrench_cannot_show_keeps_its_doubt():
+def test_what_the_wrench_cannot_show_keeps_its_doubt(rich):
     """Noise-free data: base parameters sure, the other 22 directions as uncertain as before."""
-    rows = regressor()
-    found = estimate(problem_of(rows, rows @ world().phi_true, 1e-4))
+    *_, found = rich
     base = world().basis.combine @ found.covariance @ world().basis.combine.T
     mapped = world().basis.combine @ world().prior.root
     assert np.all(np.sqrt(np.diag(base)) < 0.01 * np.sqrt(np.diag(mapped @ mapped.T)))

@@ -140,18 +140,6 @@ def test_with_a_plate_per_foot_each_feels_its_own(trial):
     assert (left @ across).mean() > 8.0 > -8.0 > (right @ across).mean()
 
 
-def test_same_seed_same_bytes(tmp_path):
-    options = StudyOptions(
-        participants=1, tasks=("static", "squat"), durations_s={"static": 0.5, "squat": 2.0}
-    )
-    for name in ("a", "b"):
-        simulate_study(tmp_path / name, options)
-    files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*.*"))
-    assert len(files) == 5
-    for file in files:
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
-
-
 def test_another_run_is_another_movement_of_the_same_person(tmp_path):
     tasks, seconds = ("static", "squat"), {"static": 0.5, "squat": 2.0}
     options = StudyOptions(participants=1, tasks=tasks, durations_s=seconds)

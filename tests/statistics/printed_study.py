@@ -14,17 +14,20 @@ def cell(values: np.ndarray) -> Cell:
     return Cell.of(f"{values.mean():.2f}({values.std(ddof=1):.2f})")
 
 
+def cohens_d(x: np.ndarray, y: np.ndarray) -> float:
+    return (y.mean() - x.mean()) / np.sqrt((x.var(ddof=1) + y.var(ddof=1)) / 2)
+
+
 def paired_row(
     name: str, x: np.ndarray, y: np.ndarray, methods: tuple[str, str] = ("A", "B")
 ) -> Row:
     """As SciPy computes it; d is (y - x) / pooled SD."""
     test = stats.ttest_rel(x, y)
     low, high = test.confidence_interval(0.95)
-    pooled = np.sqrt((x.var(ddof=1) + y.var(ddof=1)) / 2)
     tests = {
         "t": f"{test.statistic:.2f}",
         "p": f"{test.pvalue:.3f}".removeprefix("0") + ("*" if test.pvalue < 0.05 else ""),
-        "d": f"{(y.mean() - x.mean()) / pooled:.2f}",
+        "d": f"{cohens_d(x, y):.2f}",
     }
     cells = dict(zip(methods, (cell(x), cell(y)), strict=True))
     return Row(name, name, "kg", cells, tests, ci_text=f"[{low:.2f}, {high:.2f}]")

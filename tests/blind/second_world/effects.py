@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import butter, lsim, lti, sosfilt
@@ -23,9 +23,18 @@ _CONTACT = (3.0, 5.5, 0.5)  # start, length and ramp [s] of a hand's touch
 _STILL = (2.0, 7.5, 0.9)  # of the arm about it
 FZ = 2  # column of a plate's wrench
 
-# wrench (n, 6) in the plate's axes, whose z points down; times (n,) [s]; plate from 0; full [N] is
-# the load on the plate of somebody who stands still.
-Channels = Callable[[np.ndarray, np.ndarray, int, float], np.ndarray]
+
+class Signals(NamedTuple):
+    """wrench (n, 6) in the plate's axes, whose z points down; times_s (n,); plate from 0; full_n :
+    the load on the plate of somebody who stands still."""
+
+    wrench: np.ndarray
+    times_s: np.ndarray
+    plate: int
+    full_n: float
+
+
+Channels = Callable[[Signals], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -133,22 +142,6 @@ def changes_of(hidden: Hidden, motion: Motion) -> Changes:
     return _OTHERS[hidden.effect](hidden, motion)
 
 
-def _delay(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(delay_s=hidden.size)
-
-
-def _clock(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(fast=1e-6 * hidden.size)
-
-
-def _shift(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(shift_m=hidden.size)
-
-
-def _yaw(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(yaw_rad=np.radians(hidden.size))
-
-
 def _marker(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(moved={hidden.target: lambda t: np.tile(hidden.size, (len(t), 1))})
 
@@ -177,73 +170,53 @@ def _touch(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(loads=(Touch(hidden.target, HAND_M, hidden.size),))
 
 
-def _wobble(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(loads=(Wobble(hidden.target, np.zeros(3), hidden.size),))
-
-
 def _bend(hidden: Hidden, motion: Motion) -> Changes:
     motion.at_spine = hidden.size
     return Changes()
-
-
-def _tether(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(loads=(Tether("pelvis", WAIST_M, hidden.size),))
 
 
 def _middle_s(motion: Motion) -> float:
     return _CHANGES_AT * len(motion.t) / motion.rate_hz
 
 
-def _gain(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _gain(hidden: Hidden, seen: Signals) -> np.ndarray:
     """On the vertical force alone, of the target or of every plate."""
-    mine = hidden.target in (None, plate)
-    return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + mine * hidden.size))
+    mine = hidden.target in (None, seen.plate)
+    return _with_column(seen, FZ, seen.wrench[:, FZ] * (1.0 + mine * hidden.size))
 
 
-def _crosstalk(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _crosstalk(hidden: Hidden, seen: Signals) -> np.ndarray:
     """Of the vertical force, into the target's column."""
-    column = wrench[:, hidden.target] + hidden.size * wrench[:, FZ]
-    return _with_column(wrench, hidden.target, column)
+    column = seen.wrench[:, hidden.target] + hidden.size * seen.wrench[:, FZ]
+    return _with_column(seen, hidden.target, column)
 
 
-def _drift(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _drift(hidden: Hidden, seen: Signals) -> np.ndarray:
     """Of the first plate's vertical force, over the trial [N]."""
-    grown = hidden.size * times_s / times_s[-1] if plate == 0 else 0.0
-    return _with_column(wrench, FZ, wrench[:, FZ] - grown)
+    grown = hidden.size * seen.times_s / seen.times_s[-1] if seen.plate == 0 else 0.0
+    return _with_column(seen, FZ, seen.wrench[:, FZ] - grown)
 
 
-def _lowpass(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _lowpass(hidden: Hidden, seen: Signals) -> np.ndarray:
     """Butterworth of second order, forward only, on every channel [Hz]."""
-    rate_hz = 1.0 / (times_s[1] - times_s[0])
+    rate_hz = 1.0 / (seen.times_s[1] - seen.times_s[0])
     sections = butter(2, hidden.size, fs=rate_hz, output="sos")
-    return sosfilt(sections, wrench - wrench[0], axis=0) + wrench[0]
+    return sosfilt(sections, seen.wrench - seen.wrench[0], axis=0) + seen.wrench[0]
 
 
-def _nonlinear(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _nonlinear(hidden: Hidden, seen: Signals) -> np.ndarray:
     """A gain of the vertical force that grows with it, 1 at rest."""
-    gain = 1.0 + hidden.size * (-wrench[:, FZ] / full_n - 1.0)
-    return _with_column(wrench, FZ, wrench[:, FZ] * gain)
+    gain = 1.0 + hidden.size * (-seen.wrench[:, FZ] / seen.full_n - 1.0)
+    return _with_column(seen, FZ, seen.wrench[:, FZ] * gain)
 
 
-def _clipped(
-    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
-) -> np.ndarray:
+def _clipped(hidden: Hidden, seen: Signals) -> np.ndarray:
     """The vertical force ends at so many times its value at rest."""
-    return _with_column(wrench, FZ, np.maximum(wrench[:, FZ], -hidden.size * full_n))
+    return _with_column(seen, FZ, np.maximum(seen.wrench[:, FZ], -hidden.size * seen.full_n))
 
 
-def _with_column(wrench: np.ndarray, column: int, course: np.ndarray) -> np.ndarray:
-    changed = wrench.copy()
+def _with_column(seen: Signals, column: int, course: np.ndarray) -> np.ndarray:
+    changed = seen.wrench.copy()
     changed[:, column] = course
     return changed
 
@@ -257,16 +230,18 @@ _CHANNELS: dict[str, Callable[..., np.ndarray]] = {
     "clipped": _clipped,
 }
 _OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
-    "delay": _delay,
-    "clock": _clock,
-    "shift": _shift,
-    "yaw": _yaw,
+    "delay": lambda hidden, motion: Changes(delay_s=hidden.size),
+    "clock": lambda hidden, motion: Changes(fast=1e-6 * hidden.size),
+    "shift": lambda hidden, motion: Changes(shift_m=hidden.size),
+    "yaw": lambda hidden, motion: Changes(yaw_rad=np.radians(hidden.size)),
     "marker": _marker,
     "slip": _slip,
     "worn": _worn,
     "dropped": _dropped,
     "touch": _touch,
-    "wobble": _wobble,
+    "wobble": lambda hidden, motion: Changes(
+        loads=(Wobble(hidden.target, np.zeros(3), hidden.size),)
+    ),
     "bend": _bend,
-    "tether": _tether,
+    "tether": lambda hidden, motion: Changes(loads=(Tether("pelvis", WAIST_M, hidden.size),)),
 }

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
 from tests.blind.second_world.balance import GRAVITY, Balanced, by_foot
-from tests.blind.second_world.effects import Changes
+from tests.blind.second_world.effects import Changes, Signals
 from tests.blind.second_world.landmarks import MARKER_SETS
 from tests.blind.second_world.skin import Skin
 from tests.blind.second_world.smooth import about_z
@@ -140,7 +140,7 @@ class Lab:
             wrench = at_sensors(plate, CubicSpline(t, np.hstack([force, moment]))(late))
             wrench[:, 2] *= plate.gain
             for channels in changes.channels:
-                wrench = channels(wrench, times, number, full_n)
+                wrench = channels(Signals(wrench, times, number, full_n))
             mains = np.outer(np.sin(2.0 * np.pi * _MAINS_HZ * times + number), _MAINS)
             wrenches.append(wrench + self._noise(plate, len(times), rng) + mains)
         corners = tuple(self._stated_corners(plate, changes) for plate in self.plates)

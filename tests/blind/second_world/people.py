@@ -47,13 +47,17 @@ def _case(
     who: str,
     equipment: Equipment,
     *hidden: Hidden,
-    tasks: tuple[str, ...] = ("squat", "steps"),
+    tasks: str = "",
     jolting: bool = False,
 ) -> Case:
-    """who : seed, sex, mass [kg] and height [m]."""
+    """who : seed, sex, mass [kg] and height [m]. tasks : squats and that which shows what is
+    hidden, unless told."""
+    shown = next((one.task for one in hidden if one.task not in (None, "squat")), "steps")
     seed, sex, mass_kg, height_m = who.split()
     somebody = Somebody(int(seed), sex, float(mass_kg), float(height_m))
-    return Case(name, somebody, equipment, tasks, hidden, jolting)
+    return Case(
+        name, somebody, equipment, tuple((tasks or f"squat {shown}").split()), hidden, jolting
+    )
 
 
 ONE, TWO = Equipment(), Equipment(two_plates=True)
@@ -61,7 +65,6 @@ PLUG = Equipment("plugin_gait")
 PLUG_TWO = Equipment("plugin_gait", two_plates=True)
 MEDIAL = Equipment("plugin_gait_medial")
 MEDIAL_TWO = Equipment("plugin_gait_medial", two_plates=True)
-_SQUAT_SWAY = ("squat", "sway")
 _SHANK = ("shank_r", (0.02, -0.05, -0.2))
 _HAND = ("hand_r", (0.02, 0.0, -0.07))
 _CHEST = ("torso", (0.12, 0.0, 0.2))
@@ -72,25 +75,23 @@ NULLS = (
         "null-3",
         "103 F 69.0 1.72",
         replace(ONE, rate_hz=200, plate_type=3),
-        tasks=("heeldrop", "sway"),
+        tasks="heeldrop sway",
         jolting=True,
     ),
-    _case(
-        "null-4", "104 M 90.0 1.88", replace(MEDIAL_TWO, plate_type=4), tasks=("squat", "heeldrop")
-    ),
-    _case("null-5", "105 M 65.0 1.70", replace(TWO, rate_hz=120), tasks=_SQUAT_SWAY),
+    _case("null-4", "104 M 90.0 1.88", replace(MEDIAL_TWO, plate_type=4), tasks="squat heeldrop"),
+    _case("null-5", "105 M 65.0 1.70", replace(TWO, rate_hz=120), tasks="squat sway"),
     _case("null-6", "106 F 72.0 1.69", PLUG),
     _case("null-7", "107 M 83.0 1.82", replace(TWO, plate_type=3)),
     _case(
         "null-8",
         "108 F 52.0 1.58",
         replace(MEDIAL, rate_hz=120),
-        tasks=("heeldrop", "steps"),
+        tasks="heeldrop steps",
         jolting=True,
     ),
 )
 IN_ALL_TRIALS = (
-    _case("delay-12ms", "201 M 81.0 1.83", TWO, Hidden("delay", 0.012), tasks=_SQUAT_SWAY),
+    _case("delay-12ms", "201 M 81.0 1.83", TWO, Hidden("delay", 0.012), tasks="squat sway"),
     _case("delay-6ms", "211 F 64.0 1.71", MEDIAL, Hidden("delay", 0.006)),
     _case("shift-20mm", "202 F 66.0 1.70", MEDIAL, Hidden("shift", (0.020, 0))),
     _case("shift-15mm", "215 M 71.0 1.79", TWO, Hidden("shift", (0, 0.015))),
@@ -102,27 +103,9 @@ IN_ONE_TRIAL = (
     _case("drift-15n", "210 M 68.0 1.74", TWO, Hidden("drift", 15.0, task="squat")),
     _case("worn-on-shank", "203 F 61.0 1.66", ONE, Hidden("worn", 1.2, _SHANK, "squat")),
     _case("worn-on-chest", "214 M 88.0 1.84", MEDIAL_TWO, Hidden("worn", 1.0, _CHEST, "steps")),
-    _case(
-        "dropped",
-        "208 M 79.0 1.78",
-        ONE,
-        Hidden("dropped", 0.6, "hand_r", "sway"),
-        tasks=_SQUAT_SWAY,
-    ),
-    _case(
-        "touch-by-right",
-        "205 M 72.0 1.76",
-        ONE,
-        Hidden("touch", 30.0, "hand_r", "sway"),
-        tasks=_SQUAT_SWAY,
-    ),
-    _case(
-        "touch-by-left",
-        "213 F 59.0 1.64",
-        PLUG_TWO,
-        Hidden("touch", 35.0, "hand_l", "sway"),
-        tasks=_SQUAT_SWAY,
-    ),
+    _case("dropped", "208 M 79.0 1.78", ONE, Hidden("dropped", 0.6, "hand_r", "sway")),
+    _case("touch-by-right", "205 M 72.0 1.76", ONE, Hidden("touch", 30.0, "hand_r", "sway")),
+    _case("touch-by-left", "213 F 59.0 1.64", PLUG_TWO, Hidden("touch", 35.0, "hand_l", "sway")),
     _case(
         "slipped-marker",
         "204 M 77.0 1.80",
@@ -144,7 +127,7 @@ LATER = (
         "402 M 95.0 1.81",
         ONE,
         Hidden("wobble", 4.0, "pelvis", "heeldrop"),
-        tasks=("heeldrop", "squat"),
+        tasks="heeldrop squat",
     ),
     _case(
         "gain-of-one-plate", "403 F 62.0 1.69", replace(TWO, rate_hz=120), Hidden("gain", 0.045, 0)
@@ -158,20 +141,8 @@ LATER = (
         replace(MEDIAL_TWO, rate_hz=120),
         Hidden("crosstalk", -0.02, 0),
     ),
-    _case(
-        "dropped-by-left",
-        "406 F 57.0 1.62",
-        PLUG_TWO,
-        Hidden("dropped", 0.4, "hand_l", "sway"),
-        tasks=_SQUAT_SWAY,
-    ),
-    _case(
-        "worn-on-hand",
-        "407 M 76.0 1.80",
-        TWO,
-        Hidden("worn", 0.7, _HAND, "sway"),
-        tasks=_SQUAT_SWAY,
-    ),
+    _case("dropped-by-left", "406 F 57.0 1.62", PLUG_TWO, Hidden("dropped", 0.4, "hand_l", "sway")),
+    _case("worn-on-hand", "407 M 76.0 1.80", TWO, Hidden("worn", 0.7, _HAND, "sway")),
     _case(
         "slipped-ankle", "408 F 65.0 1.70", ONE, Hidden("slip", (0.025, 0.0, 0.0), "LMALL", "squat")
     ),

@@ -7,6 +7,7 @@ simulator: the person is calibrated from the marker positions below, the motions
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,7 +21,6 @@ from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.calibration import Calibration, calibrate
 
 HEIGHT_M = 1.77
-
 # Right side and middle, world [m]: X anterior, Y left, Z up.
 _RIGHT = {
     "RTEM": (0.05, -0.075, 1.66),
@@ -86,8 +86,6 @@ def with_girdle() -> Calibration:
 @cache
 def tilted_person(girdle: bool = False) -> Person:
     """The person with hinges that lean, and joints off the planes of symmetry."""
-    from dataclasses import replace
-
     person = (with_girdle() if girdle else standing()).person
     rng = np.random.default_rng(2)
     hinges = np.array([kind == "revolute" for kind in person.skeleton.joint_types])

@@ -91,13 +91,6 @@ def test_the_noise_level_survives_a_labs_low_pass_at_25_hz(rate_hz):
     assert levels.std() < 0.1 * NOISE
 
 
-def test_slow_motion_is_no_noise():
-    times = np.arange(2000) / 100
-    swing = 0.5 * np.sin(2 * np.pi * 0.7 * times) + 0.2 * np.sin(2 * np.pi * 2.1 * times)
-    samples = swing[:, None] + np.random.default_rng(4).normal(0, 1e-4, (2000, 1))
-    assert noise_level(samples, 100.0)[0] == pytest.approx(1e-4, rel=0.2)
-
-
 @pytest.mark.parametrize("rate_hz", [100.0, 250.0])
 def test_the_stated_sd_is_the_true_error(rate_hz):
     """In slow phases: at the burst's edges the pace lags and the error is larger for a moment."""

@@ -49,19 +49,9 @@ class PlateSpec:
         moment = top - np.cross(force, [0, 0, az0])
         fx, fy, fz = force.T
         fx12 = fx / 2 - moment[:, 2] / (2 * b)
-        quarter, over, across = fz / 4, moment[:, 0] / (4 * b), moment[:, 1] / (4 * a)
-        return np.array(
-            [
-                fx12,
-                fx - fx12,
-                fy / 2,
-                fy / 2,
-                quarter + over - across,
-                quarter + over + across,
-                quarter - over + across,
-                quarter - over - across,
-            ]
-        )
+        over = np.outer([1, 1, -1, -1], moment[:, 0] / (4 * b))
+        across = np.outer([-1, 1, 1, -1], moment[:, 1] / (4 * a))
+        return np.vstack([fx12, fx - fx12, fy / 2, fy / 2, fz / 4 + over + across])
 
 
 def write_c3d(
@@ -152,33 +142,36 @@ def _describe(
 
 def write_trc(
     path: Path,
-    time_s: np.ndarray,
+    time_s: np.ndarray | Sequence[str],
     markers_m: np.ndarray,
     labels: Sequence[str],
     unit: str = "mm",
     rate_hz: float = 100.0,
-    heading: str = "Frame#\tTime\t",
 ) -> Path:
-    """Markers (n, k, 3), lab frame, as TRC; NaN as empty cells."""
+    """Markers (n, k, 3), lab frame, as TRC; NaN as empty cells; times also as they are printed."""
     size = 1e-3 if unit == "mm" else 1.0
     n, k, _ = markers_m.shape
     names = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits"
     lines = [f"PathFileType\t4\t(X/Y/Z)\t{path.name}", names]
-    lines += [f"{rate_hz}\t{rate_hz}\t{n}\t{k}\t{unit}", heading + "\t\t\t".join(labels)]
+    lines.append(f"{rate_hz:.12g}\t{rate_hz:.12g}\t{n}\t{k}\t{unit}")
+    lines.append("Frame#\tTime\t" + "\t\t\t".join(labels))
     lines += ["\t\t" + "\t".join(f"{a}{i + 1}" for i in range(k) for a in "XYZ"), ""]
     for i, (t, frame) in enumerate(zip(time_s, markers_m / size, strict=True)):
         cells = ["" if np.isnan(x) else f"{x:.9g}" for x in frame.ravel()]
-        lines.append("\t".join([str(i + 1), f"{t:.9g}", *cells]))
+        lines.append("\t".join([str(i + 1), t if isinstance(t, str) else f"{t:.9g}", *cells]))
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
-def write_mot(path: Path, time_s: np.ndarray, columns: dict[str, np.ndarray]) -> Path:
-    """Columns by name under 'time'."""
-    table = np.column_stack([time_s, *columns.values()])
-    lines = [path.stem, "version=1", f"nRows={len(table)}", "inDegrees=yes", "endheader"]
+def write_mot(
+    path: Path, time_s: np.ndarray | Sequence[str], columns: dict[str, np.ndarray]
+) -> Path:
+    """Columns by name under 'time'; times also as they are printed."""
+    lines = [path.stem, "version=1", f"nRows={len(time_s)}", "inDegrees=yes", "endheader"]
     lines.append("\t".join(["time", *columns]))
-    lines += ["\t".join(f"{x:.12g}" for x in row) for row in table]
+    for t, *row in zip(time_s, *columns.values(), strict=True):
+        stamp = t if isinstance(t, str) else f"{t:.12g}"
+        lines.append("\t".join([stamp, *(f"{x:.12g}" for x in row)]))
     path.write_text("\n".join(lines) + "\n")
     return path
 
@@ -207,12 +200,9 @@ def standing_markers(n: int, height_m: float = 1.7) -> tuple[np.ndarray, list[st
 def standing_wrench(n: int, mass_kg: float = 70.0) -> tuple[np.ndarray, np.ndarray]:
     """A smooth push near the plate's centre: force, moment about the origin, (n, 3) each."""
     t = np.linspace(0, 1, n)
+    weight_N = mass_kg * 9.80665
     force = np.column_stack(
-        [
-            12 * np.sin(6 * t),
-            -9 * np.cos(5 * t),
-            mass_kg * 9.80665 * (1 + 0.1 * np.sin(9 * t)),
-        ]
+        [12 * np.sin(6 * t), -9 * np.cos(5 * t), weight_N * (1 + 0.1 * np.sin(9 * t))]
     )
     point = np.column_stack([0.2 + 0.03 * np.sin(4 * t), 0.3 + 0.05 * np.cos(7 * t), 0 * t])
     free = np.column_stack([0 * t, 0 * t, 2 * np.sin(3 * t)])

@@ -1,4 +1,6 @@
-"""Samples at an amplifier's limit, lost ones and copies, beside courses that are only calm."""
+"""Samples at a limit, lost ones, spikes and copies, beside courses that are only calm."""
+
+from __future__ import annotations
 
 from types import SimpleNamespace
 
@@ -7,7 +9,8 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 from bsip_cli.recordings import plate_reading as copies
-from bsip_cli.recordings.analog import SampleCheck, check_samples, sample_findings
+from bsip_cli.recordings.analog import SampleCheck, check_samples, sample_findings, spike_samples
+from tests.circumstances.sound import sound_session
 
 RATE_HZ = 1000.0
 TIME_S = np.arange(4000) / RATE_HZ
@@ -245,3 +248,39 @@ def test_a_calm_load_and_a_calm_plate_are_no_dead_channel():
     for channels in (smooth, unloaded):
         found = check_samples(channels, channels / 0.01, channels[:, 2], 1000.0)
         assert not found.stuck[:, 2].any() and found.silent_channels == ()
+
+
+@pytest.mark.parametrize("per_frame", [1, 4, 10])
+@pytest.mark.parametrize("weights", [0.1, 0.5])
+def test_a_spike_of_one_sample_is_found_in_any_movement(per_frame, weights):
+    rng = np.random.default_rng(7)
+    found = []
+    for laboratory in ("walkway", "side-by-side"):
+        session = sound_session(laboratory, 0)
+        for trial in session.trials:
+            force = trial.sampled(100.0, per_frame).force_N[:, 0]
+            force = force + rng.normal(0.0, 0.5, force.shape)
+            for _ in range(5):
+                k, channel = rng.integers(3, len(force) - 3), rng.integers(3)
+                hit = force.copy()
+                hit[k, channel] += weights * 9.81 * session.mass_kg * rng.choice([-1, 1])
+                found.append(np.flatnonzero(spike_samples(hit, hit[:, 2])).tolist() == [k])
+    # At the markers' rate a step may look like one.
+    assert np.mean(found) >= (0.75 if per_frame == 1 else 0.95)
+
+
+def test_a_foot_that_touches_down_is_no_spike():
+    """300 Hz; as a plate of a public recording has it, an impact of one sample's length."""
+    load = np.zeros(300)
+    load[100:] = 600.0 + 50.0 * np.sin(np.arange(200) / 10.0)
+    impact = np.zeros(300)
+    impact[99:106] = [7.7, 35.8, 12.0, -8.2, -25.1, -30.0, -15.0]
+    assert not spike_samples(np.column_stack([impact, load]), load).any()
+
+
+def test_flight_on_a_plate_set_to_zero_is_not_lost():
+    """Down in 50 ms and up in 10."""
+    load = np.interp(np.arange(3000), [950, 1000, 2000, 2010], [700.0, 0.0, 0.0, 700.0])
+    channels = np.column_stack([0 * load, 0 * load, load])
+    assert not check_samples(channels, channels, load, RATE_HZ).lost.any()
+    assert not spike_samples(channels, load).any()

@@ -1,4 +1,4 @@
-"""Forces of another clock are found by the body that they drive, and moved."""
+"""Forces go with the momentum of the body that they drive: of another clock they are moved."""
 
 from __future__ import annotations
 
@@ -6,13 +6,122 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.recordings.body_motion import USUAL, Balance, Body, turn_of_forces
 from bsip_cli.recordings.plate_reading import FrameChange, Opened
 from bsip_cli.recordings.read import assemble, open_recording
 from bsip_cli.recordings.session_reading import session_reading
 from bsip_cli.recordings.trial_samples import Delay, Lags, TrialSamples, lags, surest
 from tests.recordings.standing_on_two_plates import RATE_HZ, N, motion, of_c3d, of_table, opened
+
+BODY_HZ, N_BODY, MASS_KG = 100.0, 300, 70.0
+FRAMES = np.arange(N_BODY)
+
+
+def _trunk() -> dict[str, np.ndarray]:
+    """A trunk that sways and turns about the vertical; one segment that holds all of the mass."""
+    t = FRAMES / BODY_HZ
+    arms = np.array([[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, -0.2, 0.0]])
+    turned = [Rotation.from_euler("z", 0.4 * np.sin(5.0 * t)[:, None]).apply(arm) for arm in arms]
+    path = np.column_stack([0.05 * np.sin(4.0 * t), 0.03 * np.cos(6.0 * t), np.ones_like(t)])
+    return {"lower_torso": np.stack([arm + path for arm in turned], axis=1)}
+
+
+def _wrench(body: Body) -> np.ndarray:
+    """What Newton and Euler ask for, about the world's origin."""
+    force = MASS_KG * (body.rate[:, :3] + np.array([0.0, 0.0, GRAVITY_M_S2]))
+    moment = MASS_KG * body.rate[:, 3:] + np.cross(body.place_m, force)
+    return np.nan_to_num(np.hstack([force, moment]))
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Body.of(_trunk(), BODY_HZ, FRAMES)
+
+
+def test_its_own_wrench_balances_and_drives_it(body):
+    found = Balance.of(body, _wrench(body), USUAL)
+    assert max(found.gaps_m) < 1e-6
+    assert all(found.correlations[kind] > 0.95 for kind in ("force", "vertical"))
+    assert found.drive_log_likelihood() > 10.0
+
+
+@pytest.mark.parametrize(("columns", "kind"), [([0, 1], "force"), ([5], "vertical")])
+def test_a_reversed_part_goes_against_the_motion(body, columns, kind):
+    about_centre = _wrench(body)
+    about_centre[:, 3:] -= np.cross(body.place_m, about_centre[:, :3])
+    about_centre[:, columns] *= -1.0
+    about_centre[:, 3:] += np.cross(body.place_m, about_centre[:, :3])
+    assert Balance.of(body, about_centre, USUAL).correlations[kind] < -0.95
+
+
+def test_other_axes_change_nothing(body):
+    mirror = np.diag([1.0, -1.0, 1.0])
+    wrench = _wrench(body)
+    seen = np.hstack([wrench[:, :3] @ mirror, -wrench[:, 3:] @ mirror])
+    one = Balance.of(body, wrench, USUAL)
+    other = Balance.of(body.moved(mirror), seen, USUAL)
+    assert one.numbers == other.numbers
+    assert one.correlations == pytest.approx(other.correlations)
+
+
+@pytest.mark.parametrize(
+    "change", [np.diag([1.0, -1.0, 1.0]), np.diag([-1.0, -1.0, 1.0]), np.eye(3)[[1, 0, 2]]]
+)
+def test_the_force_alone_goes_with_the_body_in_whatever_axes(body, change):
+    """And whatever its moments are."""
+    wrench = _wrench(body)
+    one = Balance.of(body, wrench, USUAL)
+    other = Balance.of(body, np.hstack([wrench[:, :3] @ change.T, 0.0 * wrench[:, 3:]]), USUAL)
+    assert other.level_log_likelihood() == pytest.approx(one.level_log_likelihood(), rel=1e-3)
+    assert one.level_log_likelihood() > 10.0
+    assert other.drive_log_likelihood() < 0.5 * one.drive_log_likelihood()
+
+
+def test_a_body_of_which_little_is_seen_says_nothing():
+    little = Body.of({"foot_l": _trunk()["lower_torso"]}, BODY_HZ, FRAMES)
+    found = Balance.of(little, np.ones((N_BODY, 6)), USUAL)
+    assert found.gaps_m == () and found.log_likelihood(USUAL) == 0.0
+
+
+def test_each_trial_counts_with_its_own_means(body):
+    """A force that is offset in one of two trials goes with the motion no less."""
+    offset = _wrench(body)
+    offset[:, 0] += 30.0
+    one = Balance.of(body, _wrench(body), USUAL)
+    both = Balance.of(Body.of_all([body, body]), np.vstack([_wrench(body), offset]), USUAL)
+    assert len(both.gaps_m) == 2
+    assert both.correlations["force"] == pytest.approx(one.correlations["force"], abs=1e-3)
+
+
+def test_a_centre_of_mass_that_is_thought_to_be_elsewhere_is_a_gap_and_no_motion(body):
+    wrench = _wrench(body)
+    aside = replace(body, place_m=body.place_m + np.array([0.03, -0.02, 0.0]))
+    one, other = (Balance.of(each, wrench, USUAL) for each in (body, aside))
+    assert max(other.gaps_m) == pytest.approx(np.hypot(0.03, 0.02), rel=0.05)
+    assert other.correlations["level"] == pytest.approx(one.correlations["level"], abs=0.02)
+
+
+def test_noise_is_that_of_markers_seen_to_a_millimetre():
+    """White noise on markers at rest, against what is said of its momentum's rate."""
+    rng = np.random.default_rng(3)
+    still = np.repeat(_trunk()["lower_torso"][:1], 4000, axis=0)
+    noisy = {"lower_torso": still + rng.normal(0.0, 1e-3, still.shape)}
+    body = Body.of(noisy, BODY_HZ, np.arange(4000))
+    expected = 1e-6 * body.noise[0]
+    np.testing.assert_allclose(np.nanvar(body.rate, axis=0), expected, rtol=0.25)
+
+
+@pytest.mark.parametrize("turn_deg", [-125.0, 0.0, 31.0])
+def test_the_turn_of_forces_is_found(body, turn_deg):
+    turn = Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
+    noise = np.random.default_rng(1).normal(0.0, 5.0, (N_BODY, 6))
+    angle, sd = turn_of_forces(body, _wrench(body) @ np.kron(np.eye(2), turn) + noise, USUAL)
+    assert np.rad2deg(sd) < 5.0
+    assert np.rad2deg(angle) == pytest.approx(turn_deg, abs=3 * np.rad2deg(sd))
+
 
 MOVING = (  # walks, a jump, sitting down: each alone tells that its rate is twice the cameras'
     "zoo_children/HC031A-straight.c3d",

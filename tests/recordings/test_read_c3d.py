@@ -28,13 +28,32 @@ RATIO = 10
 
 
 def _spec(**options) -> PlateSpec:
-    force, moment = standing_wrench(N * RATIO)
-    return PlateSpec(force, moment, **options)
+    return PlateSpec(*standing_wrench(N * RATIO), **options)
 
 
-def _write(path, spec, **options):
-    markers, labels = standing_markers(N)
-    return write_c3d(path, markers, labels, [spec], **options)
+def _origin(kind: int) -> np.ndarray:
+    """Under the surface; of sensors the distances from its middle."""
+    return np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
+
+
+def _write(path, *specs, **options):
+    return write_c3d(path, *standing_markers(N), specs, **options)
+
+
+def _edited(tmp_path, *changes: tuple[int, bytes]):
+    """A file with other bytes at these places."""
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = bytearray(path.read_bytes())
+    for at, new in changes:
+        content[at : at + len(new)] = new
+    path.write_bytes(content)
+    return path
+
+
+def _value_of(tmp_path, group: bytes, name: bytes) -> int:
+    """The place of a parameter's first value in such a file."""
+    content = _write(tmp_path / "sound.c3d", _spec()).read_bytes()
+    return content.find(name, content.find(group)) + len(name) + 4
 
 
 def _check_wrench(recording: Recording, atol_N: float = 0.01) -> None:
@@ -57,8 +76,8 @@ def test_writer_winds_the_corners_as_the_format_wants():
 
 @pytest.mark.parametrize("kind", [1, 2, 3, 4])
 def test_known_wrench_comes_back(tmp_path, kind):
-    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
-    recording = read_recording(_write(tmp_path / "a.c3d", _spec(kind=kind, origin_m=origin)))
+    spec = _spec(kind=kind, origin_m=_origin(kind))
+    recording = read_recording(_write(tmp_path / "a.c3d", spec))
     _check_wrench(recording)
     assert not recording.findings
     assert recording.analog_rate_hz == 1000.0
@@ -74,6 +93,7 @@ def test_known_wrench_comes_back(tmp_path, kind):
         ("mete", "Newtons", "Newton-meters"),
         ("mm", "nt", "ntmm"),
         ("mm", "V", "V"),
+        ("mm", "Q", "Nmm"),
     ],
 )
 def test_units(tmp_path, unit, force_unit, moment_unit):
@@ -83,14 +103,8 @@ def test_units(tmp_path, unit, force_unit, moment_unit):
     _check_wrench(recording)
     markers, _ = standing_markers(N)
     np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
-    expected = {"mete": ["corrected"], "mm": ["info"] if moment_unit == "V" else []}
-    assert _levels(recording, "unit") == expected.get(unit, [])
-
-
-def test_misprinted_units_of_channels_are_said(tmp_path):
-    recording = read_recording(_write(tmp_path / "a.c3d", _spec(), force_unit="Q"))
-    _check_wrench(recording)
-    assert _levels(recording, "unit") == ["warning"]
+    expected = {"mete": "corrected", "V": "info", "Q": "warning"}
+    assert _levels(recording, "unit") == [expected[x] for x in (unit, force_unit) if x in expected]
 
 
 @pytest.mark.parametrize(("unit", "size"), [("m", 1e-3), ("mm", 1.0), ("furlong", 1e-3)])
@@ -105,15 +119,15 @@ def test_a_unit_that_makes_no_person_is_corrected(tmp_path, unit, size):
     assert _levels(recording, "unit") == ["corrected"]
 
 
-def test_header_and_parameters_that_disagree(tmp_path):
+@pytest.mark.parametrize("what", ["points", "data"])
+def test_header_and_parameters_that_disagree(tmp_path, what):
     """The frames' own order tells which counts are right; a rate is no count."""
-    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
-    at = content.find(b"USED") + len("USED") + 2 + 2
-    assert content[at] == 8
-    content[at] = 9
-    path = tmp_path / "b.c3d"
-    path.write_bytes(content)
-    recording = read_recording(path)
+    sound = _write(tmp_path / "a.c3d", _spec()).read_bytes()
+    at, stated = (
+        (_value_of(tmp_path, b"POINT", b"USED"), 8) if what == "points" else (16, sound[16])
+    )
+    assert sound[at] == stated
+    recording = read_recording(_edited(tmp_path, (at, bytes([stated + 1]))))
     _check_wrench(recording)
     assert _levels(recording, "layout") == ["warning"]
 
@@ -141,13 +155,8 @@ def test_corners_that_are_no_rectangle_are_said(tmp_path, away):
 
 
 def test_rate_of_the_plates_that_is_no_multiple(tmp_path):
-    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
-    group = content.find(b"ANALOG")
-    at = content.find(b"RATE", group) + len("RATE") + 2 + 2
-    content[at : at + 4] = np.array([1037.0], "<f4").tobytes()
-    path = tmp_path / "b.c3d"
-    path.write_bytes(content)
-    recording = read_recording(path)
+    at = _value_of(tmp_path, b"ANALOG", b"RATE")
+    recording = read_recording(_edited(tmp_path, (at, np.array([1037.0], "<f4").tobytes())))
     _check_wrench(recording)
     assert recording.analog_rate_hz == 1000.0
     assert _levels(recording, "rate") == ["corrected"]
@@ -162,21 +171,9 @@ def test_more_frames_than_the_header_can_count(tmp_path):
     np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
 
 
-def test_data_elsewhere_than_the_header_says(tmp_path):
-    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
-    content[16] += 1
-    path = tmp_path / "b.c3d"
-    path.write_bytes(content)
-    recording = read_recording(path)
-    _check_wrench(recording)
-    assert _levels(recording, "layout") == ["warning"]
-
-
 def test_a_header_that_promises_the_world_takes_no_memory(tmp_path):
-    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
-    content[2:4] = content[8:10] = b"\xff\x7f"  # 32767 points, and frames
-    path = tmp_path / "b.c3d"
-    path.write_bytes(content)
+    promise = b"\xff\x7f"  # 32767 points, and frames
+    path = _edited(tmp_path, (2, promise), (8, promise))
     tracemalloc.start()
     recording = read_recording(path)
     peak = tracemalloc.get_traced_memory()[1]
@@ -184,37 +181,14 @@ def test_a_header_that_promises_the_world_takes_no_memory(tmp_path):
     assert peak < 30e6  # the header asks for 4 GB
     assert _levels(recording, "layout") == ["warning"]
     _check_wrench(recording)
-    group = content.find(b"POINT")
-    at = content.find(b"USED", group) + len("USED") + 2 + 2
-    content[at : at + 2] = b"\xff\x7f"
-    path.write_bytes(content)
+    at = _value_of(tmp_path, b"POINT", b"USED")
     with pytest.raises(BadDataError, match="promises"):
-        read_recording(path)
-
-
-def test_moments_in_nmm_labelled_nm_are_seen(tmp_path):
-    spec = _spec()
-    path = _write(tmp_path / "a.c3d", _ScaledMoments(spec, 1000.0), moment_unit="Nm")
-    recording = read_recording(path)
-    _check_wrench(recording, atol_N=0.1)
-    assert _levels(recording, "plate_cop") == ["corrected"]
-
-
-class _ScaledMoments(PlateSpec):
-    """A plate that writes its moments too large."""
-
-    def __init__(self, spec: PlateSpec, factor: float) -> None:
-        super().__init__(**vars(spec))
-        self.factor = factor
-
-    def channels(self) -> np.ndarray:
-        return super().channels() * np.repeat([1.0, self.factor], 3)[:, None]
+        read_recording(_edited(tmp_path, (2, promise), (8, promise), (at, promise)))
 
 
 @pytest.mark.parametrize("kind", [2, 3, 4])
 def test_flipped_sign_is_corrected_and_said(tmp_path, kind):
-    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
-    spec = _spec(kind=kind, origin_m=origin, sign=-1.0)
+    spec = _spec(kind=kind, origin_m=_origin(kind), sign=-1.0)
     recording = read_recording(_write(tmp_path / "a.c3d", spec))
     _check_wrench(recording)
     assert _levels(recording, "plate_sign") == ["corrected"]
@@ -222,7 +196,7 @@ def test_flipped_sign_is_corrected_and_said(tmp_path, kind):
 
 @pytest.mark.parametrize("kind", [2, 3])
 def test_origin_of_either_sign_gives_the_same_wrench(tmp_path, kind):
-    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
+    origin = _origin(kind)
     stated = origin * [1, 1, -1] if kind == 3 else -origin
     spec = _spec(kind=kind, origin_m=origin, stated_origin_m=stated)
     _check_wrench(read_recording(_write(tmp_path / "a.c3d", spec)))
@@ -294,42 +268,30 @@ def test_clipped_and_stuck_samples(tmp_path):
 @pytest.mark.parametrize("head", ["", "Tom:", "Tom_", "S01-"])
 def test_model_outputs_and_unlabelled_points_are_dropped(tmp_path, head):
     markers, labels = standing_markers(N)
-    extra = [
-        "LHipAngles",
-        "LKneeMoment",
-        "LKneeTwist",
-        "PELO",
-        "PELA",
-        "PELL",
-        "PELP",
-        "RGroundReactionForce",
-    ]
+    extra = (
+        "LHipAngles LKneeMoment LKneeTwist PELO PELA PELL PELP RGroundReactionForce CentreOfMass"
+    )
     labels = [head + label for label in labels]
+    more = [*(head + label for label in extra.split()), "*41"]
     path = write_c3d(
         tmp_path / "a.c3d",
-        np.concatenate([markers, 1.0 + np.zeros((N, len(extra) + 1, 3))], axis=1),
-        [*labels, *(head + label for label in extra), "*41"],
+        np.concatenate([markers, 1.0 + np.zeros((N, len(more), 3))], axis=1),
+        [*labels, *more],
         point_parameters={"ANGLES": ["LHipAngles", "LKneeTwist"]},
     )
     assert read_recording(path).labels == tuple(labels)
 
 
-def test_duplicate_labels_are_resolved_by_descriptions(tmp_path):
-    markers, labels = standing_markers(N)
-    labels[0] = labels[1] = "LFOO"
-    descriptions = ["heel", "toe", *["other"] * (len(labels) - 2)]
-    described = write_c3d(
-        tmp_path / "a.c3d", markers, labels, point_parameters={"DESCRIPTIONS": descriptions}
-    )
-    assert read_recording(described).labels[:2] == ("heel", "toe")
-    plain = write_c3d(tmp_path / "b.c3d", markers, labels)
-    assert read_recording(plain).labels[:2] == ("LFOO", "LFOO")  # the marker set may tell
+FAR_CORNERS_M = np.array([[0, 0, 0], [1e9, 0, 0], [1e9, 1, 0], [0, 1, 0.0]])
 
 
-def test_plate_that_claims_missing_channels(tmp_path):
-    recording = read_recording(_write(tmp_path / "a.c3d", _spec(), channel_shift=3))
-    assert recording.plates == ()
-    assert recording.forces_note
+@pytest.mark.parametrize(
+    ("corners_m", "options"), [(CORNERS_M, {"channel_shift": 3}), (FAR_CORNERS_M, {})]
+)
+def test_a_plate_of_missing_channels_or_nonsense_corners_is_left_out(tmp_path, corners_m, options):
+    path = _write(tmp_path / "a.c3d", _spec(corners_m=corners_m), **options)
+    recording = read_recording(path)
+    assert recording.plates == () and recording.forces_note
     assert _levels(recording, "plate") == ["excluded"]
 
 
@@ -348,24 +310,27 @@ def test_a_channel_measures_one_thing(tmp_path, one, other):
     assert all(said in found for found in left_out.values())
 
 
-def test_nonsense_corners_drop_the_plate(tmp_path):
-    spec = _spec(corners_m=np.array([[0, 0, 0], [1e9, 0, 0], [1e9, 1, 0], [0, 1, 0.0]]))
-    recording = read_recording(_write(tmp_path / "a.c3d", spec))
-    assert recording.plates == () and _levels(recording, "plate") == ["excluded"]
-
-
 def test_plates_never_loaded(tmp_path):
     force, moment = standing_wrench(N * RATIO)
     recording = read_recording(_write(tmp_path / "a.c3d", PlateSpec(0.01 * force, 0.01 * moment)))
     assert recording.plates == () and "never loaded" in recording.forces_note
 
 
-@pytest.mark.parametrize("content", [b"", b"no c3d at all", b"\x02P" + 510 * b"\xff"])
-def test_foreign_files_are_refused(tmp_path, content):
-    path = tmp_path / "a.c3d"
-    path.write_bytes(content)
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.c3d", b""),
+        ("a.c3d", b"no c3d at all"),
+        ("a.c3d", b"\x02P" + 510 * b"\xff"),
+        ("none.c3d", None),
+        ("a.txt", None),
+    ],
+)
+def test_foreign_and_missing_files_are_refused(tmp_path, name, content):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
     with pytest.raises(BadDataError):
-        read_recording(path)
+        read_recording(tmp_path / name)
 
 
 def test_truncated_file_is_refused(tmp_path):
@@ -373,13 +338,6 @@ def test_truncated_file_is_refused(tmp_path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(BadDataError, match="promises"):
         read_recording(path)
-
-
-def test_missing_file_is_refused(tmp_path):
-    with pytest.raises(BadDataError):
-        read_recording(tmp_path / "none.c3d")
-    with pytest.raises(BadDataError):
-        read_recording(tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize(

@@ -32,22 +32,16 @@ from tests.recordings.standing_on_two_plates import (
 PLACE_OF_LAB = (0.6, 0.2, -0.04)
 
 
-def of_table_with_mx_reversed(**faults) -> list[ForceOnPoint]:
-    signs = np.array([-1.0, 1.0, 1.0])
-    return [replace(one, moment=one.moment * signs) for one in of_table(**faults)]
+def of_other_table(force_order=(0, 1, 2), moment_signs=1.0, **faults) -> list[ForceOnPoint]:
+    return [
+        replace(one, force_N=one.force_N[:, force_order], moment=one.moment * moment_signs)
+        for one in of_table(**faults)
+    ]
 
 
-def of_c3d_with_x_for_y(**faults) -> list[C3dPlate]:
-    """Fx and Fy, Mx and My exchanged, above sensors that lie under the surface."""
-    return [replace(one, measured=one.measured[:, [1, 0, 2, 4, 3, 5]]) for one in of_c3d(**faults)]
-
-
-def of_c3d_with_fx_for_fy(**faults) -> list[C3dPlate]:
-    return [replace(one, measured=one.measured[:, [1, 0, 2, 3, 4, 5]]) for one in of_c3d(**faults)]
-
-
-def of_c3d_with_mx_for_my(**faults) -> list[C3dPlate]:
-    return [replace(one, measured=one.measured[:, [0, 1, 2, 4, 3, 5]]) for one in of_c3d(**faults)]
+def of_channels(order=range(6), signs=1.0, **faults) -> list[C3dPlate]:
+    """Channels in another order, or of the other sign."""
+    return [replace(one, measured=one.measured[:, order] * signs) for one in of_c3d(**faults)]
 
 
 def of_sensors(one: str = "", other: str = "") -> list[C3dPlate]:
@@ -85,15 +79,6 @@ def of_points(
     return sources
 
 
-def of_c3d_with_level_reversed(**faults) -> list[C3dPlate]:
-    signs = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
-    return [replace(one, measured=one.measured * signs) for one in of_c3d(**faults)]
-
-
-def of_table_with_x_for_y(**faults) -> list[ForceOnPoint]:
-    return [replace(one, force_N=one.force_N[:, [1, 0, 2]]) for one in of_table(**faults)]
-
-
 FAULTS = {
     "table, sound": (of_table, {}, ""),
     "points in mm": (of_table, {"point_scale": 1e3}, "mm"),
@@ -107,8 +92,8 @@ FAULTS = {
     "moments about the origin": (of_table, {"about": "origin"}, "laboratory's origin"),
     "moments about each plate's centre": (of_table, {"about": "fixed"}, "about one point"),
     "moments about the centres, Mx reversed": (
-        of_table_with_mx_reversed,
-        {"about": "fixed"},
+        of_other_table,
+        {"about": "fixed", "moment_signs": [-1.0, 1.0, 1.0]},
         "about one point of the plate, the points for centres of pressure, reversed Mx",
     ),
     "points in mm, moments about the centres in N mm": (
@@ -128,14 +113,22 @@ FAULTS = {
         "for a place",
     ),
     "X and Y exchanged": (
-        of_c3d_with_x_for_y,
-        {"origin_m": (0.0, 0.0, -0.06)},
+        of_channels,
+        {"order": [1, 0, 2, 4, 3, 5], "origin_m": (0.0, 0.0, -0.06)},
         "in the other direction round",
     ),
-    "Fx and Fy exchanged": (of_c3d_with_fx_for_fy, {}, "exchanged Fx and Fy"),
-    "Mx and My exchanged": (of_c3d_with_mx_for_my, {}, "exchanged Mx and My"),
-    "Fx and Fy of a table exchanged": (of_table_with_x_for_y, {}, "exchanged Fx and Fy"),
-    "Fx and Fy reversed": (of_c3d_with_level_reversed, {}, "reversed Fx and Fy"),
+    "Fx and Fy exchanged": (of_channels, {"order": [1, 0, 2, 3, 4, 5]}, "exchanged Fx and Fy"),
+    "Mx and My exchanged": (of_channels, {"order": [0, 1, 2, 4, 3, 5]}, "exchanged Mx and My"),
+    "Fx and Fy of a table exchanged": (
+        of_other_table,
+        {"force_order": [1, 0, 2]},
+        "exchanged Fx and Fy",
+    ),
+    "Fx and Fy reversed": (
+        of_channels,
+        {"signs": [-1.0, -1.0, 1.0, 1.0, 1.0, 1.0]},
+        "reversed Fx and Fy",
+    ),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
     "eight sensors, sound": (of_sensors, {}, ""),
     "a point and a torque, sound": (of_points, {}, ""),
@@ -209,12 +202,16 @@ def test_no_reading_is_tried_twice():
 
 
 def test_exchanged_plates():
+    """And a trial that lacks one of them leaves out what the other one measures."""
     one, two = of_c3d()
     trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
     session = session_reading([TrialSamples.of(trial)])
     assert [v.reading.place_of for v in session.plates.values()] == ["2", "1"]
     sound = assemble(opened([one, two]), session_of())
     np.testing.assert_allclose(_total(assemble(trial, session)), _total(sound), atol=1e-9)
+    alone = assemble(opened([one]), session)
+    assert alone.plates == ()
+    assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]
 
 
 def _total(recording) -> np.ndarray:
@@ -318,8 +315,6 @@ def test_a_laboratory_may_lie_anywhere_above_the_cameras_origin(rise_m):
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_mirrored_laboratory_is_turned_back(axis):
     mirrored = opened(of_table()).in_frame(FrameChange("all", axis))
-    markers = mirrored.recording.markers_m
-    mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
     session = session_reading([TrialSamples.of(mirrored)])
     assert session.frame.moved == "all"
     there = assemble(mirrored, session)
@@ -328,32 +323,24 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
     np.testing.assert_allclose(_wrench(there)[..., 2], expected[..., 2])  # up stays up
 
 
-def test_mirrored_markers_alone_leave_the_forces():
-    trial = opened(of_table()).in_frame(FrameChange("markers", 1))
+@pytest.mark.parametrize(
+    ("moved", "back"),
+    [
+        (FrameChange("markers", 1), FrameChange("markers", 1)),
+        (FrameChange("forces", 0), FrameChange("forces", 0)),
+        *(
+            (FrameChange("forces", turned_deg=turn), FrameChange("forces", turned_deg=360 - turn))
+            for turn in (90.0, 180.0, 270.0)
+        ),
+    ],
+)
+def test_markers_or_forces_in_other_axes_are_turned_back(moved, back):
+    trial = opened(of_table()).in_frame(moved)
     session = session_reading([TrialSamples.of(trial)])
-    assert session.frame == FrameChange("markers", 1)
-    np.testing.assert_allclose(assemble(trial, session).markers_m, motion()[0])
-
-
-def test_mirrored_forces_alone_leave_the_markers():
-    trial = opened(of_table()).in_frame(FrameChange("forces", 0))
-    session = session_reading([TrialSamples.of(trial)])
-    assert session.frame == FrameChange("forces", 0)
-    np.testing.assert_allclose(
-        _wrench(assemble(trial, session)), _wrench(assemble(opened(of_table()), session_of()))
-    )
-
-
-@pytest.mark.parametrize("turns", [1, 2, 3])
-def test_forces_in_turned_axes_are_turned_back(turns):
-    trial = opened(of_table()).in_frame(FrameChange("forces", turned_deg=90.0 * turns))
-    session = session_reading([TrialSamples.of(trial)])
-    assert session.frame == FrameChange("forces", turned_deg=360 - 90.0 * turns)
-    np.testing.assert_allclose(
-        _wrench(assemble(trial, session)),
-        _wrench(assemble(opened(of_table()), session_of())),
-        atol=1e-9,
-    )
+    assert session.frame == back
+    there, sound = assemble(trial, session), assemble(opened(of_table()), session_of())
+    np.testing.assert_allclose(there.markers_m, motion()[0])
+    np.testing.assert_allclose(_wrench(there), _wrench(sound), atol=1e-9)
 
 
 def _slow_stance() -> list[ForceOnPoint]:
@@ -427,8 +414,11 @@ def test_the_limits_are_those_of_the_options():
     assert asdict(USUAL) == {name: getattr(options, name) for name in asdict(USUAL)}
 
 
+SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+
+
 def test_distance_from_the_feet():
-    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 3)
+    square = np.array([SQUARE] * 3)
     places = np.array([[0.5, 0.4], [1.5, 0.5], [-3.0, -4.0]])
     together = np.zeros(3, bool)
     found = Feet(square, ("", "", "", "")).distance_m(places, together)
@@ -441,10 +431,8 @@ def test_distance_from_the_feet():
 
 def test_feet_on_plates_of_their_own_are_two_areas():
     """Left and right side of a square: its middle is half a metre from either."""
-    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 2)
-    feet = Feet(square, ("l", "r", "r", "l"))
-    middle = np.full((2, 2), 0.5)
-    found = feet.distance_m(middle, np.array([False, True]))
+    feet = Feet(np.array([SQUARE] * 2), ("l", "r", "r", "l"))
+    found = feet.distance_m(np.full((2, 2), 0.5), np.array([False, True]))
     np.testing.assert_allclose(found, [0.0, 0.5], rtol=1e-3)
 
 
@@ -453,15 +441,6 @@ def test_feet_on_the_plate_count_before_all_others():
     kept = Feet(points, ("r", "l")).on(corners(0)).points_m
     assert np.isfinite(kept[0, 0]).all() and np.isnan(kept[0, 1]).all()
     np.testing.assert_array_equal(kept[1], points[1])
-
-
-def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
-    one, two = of_c3d()
-    trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
-    session = session_reading([TrialSamples.of(trial)])
-    alone = assemble(opened([one]), session)
-    assert alone.plates == ()
-    assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]
 
 
 def test_nothing_of_a_table_is_the_whole_force_while_a_plate_left_out_bears():

@@ -21,33 +21,21 @@ N = 400
 FORCE = [f"ground_force_{what}{axis}" for what in "vpm" for axis in "xyz"]
 
 
-def _trc(tmp_path, stamps, stated_hz=100.0, header=lambda text: text, n=N):
-    """Markers whose first one has moved by its frame's number in mm; ``stamps`` are cells."""
-    markers, labels = standing_markers(n)
-    markers[:, 7, 0] = 1e-3 * np.arange(n)
-    path = write_trc(tmp_path / "a.trc", np.arange(n), markers @ Y_UP_FROM_Z_UP.T, labels)
-    lines = path.read_text().replace("100.0\t100.0", f"{stated_hz:.12g}\t{stated_hz:.12g}")
-    lines = header(lines).splitlines()
-    start = len(lines) - n
-    for k, stamp in enumerate(stamps):
-        cells = lines[start + k].split("\t")
-        lines[start + k] = "\t".join([cells[0], stamp, *cells[2:]])
-    path.write_text("\n".join(lines) + "\n")
+def _trc(tmp_path, stamps, stated_hz=100.0, header=lambda text: text):
+    """Markers whose last one has moved by its frame's number in mm; ``stamps`` are cells."""
+    markers, labels = standing_markers(N)
+    markers[:, 7, 0] = 1e-3 * np.arange(N)
+    markers = markers @ Y_UP_FROM_Z_UP.T
+    path = write_trc(tmp_path / "a.trc", stamps, markers, labels, rate_hz=stated_hz)
+    path.write_text(header(path.read_text()))
     return path
 
 
-def _mot(tmp_path, stamps, n=None):
+def _mot(tmp_path, stamps):
     force, _ = standing_wrench(len(stamps))
     point = np.array([0.2, 0.0, -0.3])  # between the feet, Y up
     columns = np.hstack([force[:, [0, 2, 1]], point + 0 * force, 0 * force])
-    path = write_mot(
-        tmp_path / "a.mot", np.arange(len(stamps)), dict(zip(FORCE, columns.T, strict=True))
-    )
-    lines = path.read_text().splitlines()
-    rows = [line.split("\t")[1:] for line in lines[-len(stamps) :]]
-    rows = ["\t".join([stamp, *row]) for stamp, row in zip(stamps, rows, strict=True)]
-    path.write_text("\n".join([*lines[: -len(stamps)], *rows]) + "\n")
-    return path
+    return write_mot(tmp_path / "a.mot", stamps, dict(zip(FORCE, columns.T, strict=True)))
 
 
 def _said(recording) -> list[tuple[str, str]]:
@@ -120,6 +108,8 @@ def test_coarse_stamps_that_are_torn(tmp_path, digits):
     times = np.arange(N) / 240 + np.where(np.arange(N) < 100, 0, 5.0)
     recording = read_recording(_trc(tmp_path, [f"{t:.{digits}f}" for t in times], 240.0))
     assert recording.n_frames == N - 100 and recording.marker_rate_hz == 240.0
+    assert recording.time0_s == pytest.approx(times[100], abs=10.0**-digits)
+    np.testing.assert_allclose(recording.markers_m[:, 7, 0], 1e-3 * np.arange(100, N), atol=1e-6)
     assert [f.level for f in recording.findings if f.check == "time"] == ["warning"]
 
 
@@ -304,16 +294,14 @@ def test_no_grid_is_longer_than_both_files(tmp_path, stamp):
 
 
 @pytest.mark.parametrize(
-    ("case", "rate_hz", "n_frames"),
-    [("10a-trc-time-2-decimals-120Hz", 120.0, 406), ("10h-trc-time-3-decimals-240Hz", 240.0, 360)],
+    ("case", "task", "rate_hz", "n_frames"),
+    [
+        ("10a-trc-time-2-decimals-120Hz", "squat_run-1", 120.0, 406),
+        ("10h-trc-time-3-decimals-240Hz", "squat_run-1", 240.0, 360),
+        ("10g-trc-time-in-ms-long", "static", 50.0, 600),
+    ],
 )
-def test_the_cases_of_coarse_stamps(shared_cases, case, rate_hz, n_frames):
-    recording = read_recording(shared_cases / case / "study/sub-01/sub-01_task-squat_run-1.trc")
+def test_the_cases_of_stamps(shared_cases, case, task, rate_hz, n_frames):
+    recording = read_recording(shared_cases / case / f"study/sub-01/sub-01_task-{task}.trc")
     assert (recording.marker_rate_hz, recording.n_frames) == (rate_hz, n_frames)
-
-
-def test_the_case_of_ms(shared_cases):
-    folder = shared_cases / "10g-trc-time-in-ms-long/study/sub-01"
-    recording = read_recording(folder / "sub-01_task-static.trc")
-    assert (recording.marker_rate_hz, recording.n_frames) == (50.0, 600)
     assert len(recording.plates[0].force_N) < 24_000

@@ -1,4 +1,4 @@
-"""Solved poses against an independent optimiser, and against the poses that made the markers."""
+"""Solved poses against an independent optimiser, and the kernel's geometry against Pinocchio."""
 
 import numpy as np
 import pinocchio as pin
@@ -8,11 +8,16 @@ from scipy.optimize import least_squares
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.inverse_kinematics import (
+    coordinate_covariance,
     first_pose,
+    model_markers,
     neutral,
     place_base,
+    pose_columns,
     solve_poses,
     solve_trial,
+    subtrees,
+    tree_of,
 )
 from tests.body.standing_person import (
     away,
@@ -20,8 +25,103 @@ from tests.body.standing_person import (
     markers_of,
     random_poses,
     standing,
+    standing_markers,
     tilted_person,
 )
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    return tilted_person()
+
+
+@pytest.fixture(scope="module")
+def person():
+    return standing().person
+
+
+def test_forward_kinematics_equals_pinocchio(tilted):
+    q = random_poses(tilted, 40, 1.0, seed=1)
+    R, p = tree_of(tilted).forward(q)
+    expected_R, expected_p = joint_frames(tilted, q)
+    np.testing.assert_allclose(R, expected_R, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(p, expected_p, rtol=0, atol=1e-12)
+
+
+def test_neutral_is_pinocchios(tilted):
+    np.testing.assert_array_equal(neutral(tilted), pin.neutral(pinocchio_model(tilted)))
+
+
+def test_parents_of_velocities_follow_the_tree(tilted):
+    """Featherstone's lambda: within a joint the coordinate before, else the parent joint's last."""
+    tree, model = tree_of(tilted), pinocchio_model(tilted)
+    expected = []
+    for j in range(1, model.njoints):
+        parent = model.parents[j]
+        last = -1 if parent == 0 else model.joints[parent].idx_v + model.joints[parent].nv - 1
+        start = model.joints[j].idx_v
+        expected += [last, *range(start, start + model.joints[j].nv - 1)]
+    assert tree.arrays.v_parents.tolist() == expected
+
+
+def test_model_markers_equal_pinocchios_placements(tilted):
+    q = random_poses(tilted, 5, 0.8, seed=2)
+    R, p = tree_of(tilted).forward(q)
+    np.testing.assert_allclose(model_markers(tilted, R, p), markers_of(tilted, q), atol=1e-12)
+
+
+def test_the_calibrated_pose_shows_the_static_markers():
+    calibration = standing()
+    places = standing_markers()
+    measured = np.array([places[label] for label in calibration.person.markers])
+    np.testing.assert_allclose(
+        markers_of(calibration.person, calibration.q[None])[0], measured, atol=1e-12
+    )
+
+
+def test_subtrees_are_the_markers_that_move_with_a_joint(tilted):
+    names, below = tilted.skeleton.segments, subtrees(tilted)
+    moved = {tilted.markers[m] for m in np.flatnonzero(below[names.index("forearm_r")])}
+    assert moved == {"RFA", "RWRR", "RWRU", "RHAND"}
+    assert below[0].all()
+
+
+def test_pose_columns_equal_finite_differences(tilted):
+    model, tree = pinocchio_model(tilted), tree_of(tilted)
+    q = random_poses(tilted, 3, 0.8, seed=3)
+    R, p = tree.forward(q)
+    columns = pose_columns(tree, R, p, model_markers(tilted, R, p), subtrees(tilted))
+    h = 1e-5
+    for k in range(tree.nv):
+        step = h * np.eye(tree.nv)[k]
+        ahead = markers_of(tilted, np.stack([pin.integrate(model, one, step) for one in q]))
+        back = markers_of(tilted, np.stack([pin.integrate(model, one, -step) for one in q]))
+        np.testing.assert_allclose(columns[..., k], (ahead - back) / (2 * h), atol=1e-8)
+
+
+def test_coordinate_covariance_is_the_scatter_of_solved_poses(person):
+    """Markers shaken by 0.1 mm: the linear covariance predicts the scatter of each coordinate."""
+    rng = np.random.default_rng(4)
+    still = markers_of(person, standing().q[None])
+    shaken = still + rng.normal(0, 1e-4, (600, *still.shape[1:]))
+    solved = solve_poses(
+        person,
+        shaken,
+        standing().q,
+        marker_sd_m=1e-4,
+        robust_limit_m=1.0,
+        posture_sd_rad=0.02,
+        iterations=50,
+    )
+    errors = np.stack([away(person, standing().q, one) for one in solved.q])
+    # The prior holds the angles by itself: only the markers' part of the covariance scatters.
+    unit = coordinate_covariance(person, standing().q[None], 0.02 / 1e-4)[0] * 1e-4**2
+    prior = np.zeros(40)
+    prior[6:] = 0.02**-2
+    scatter = unit - unit @ np.diag(prior) @ unit
+    ratio = errors.std(axis=0) / np.sqrt(np.diag(scatter))
+    assert np.all(np.abs(ratio - 1) < 0.15)
+
 
 SD, LIMIT, POSTURE = 0.005, 0.025, 3.0
 OPTIONS = {
@@ -97,8 +197,7 @@ def test_noise_free_poses_come_back():
 
 @pytest.mark.parametrize("degrees", [60.0, 120.0, 170.0])
 @pytest.mark.parametrize("axis", [0, 2])
-def test_raised_arms_are_found_from_the_neutral_pose(axis, degrees):
-    person = standing().person
+def test_raised_arms_are_found_from_the_neutral_pose(person, axis, degrees):
     model = pinocchio_model(person)
     turn = np.zeros(model.nv)
     for joint, sign in (("shoulder_l", -1.0), ("shoulder_r", 1.0)):
@@ -112,9 +211,8 @@ def test_raised_arms_are_found_from_the_neutral_pose(axis, degrees):
     assert np.abs(same).max() < 1e-7
 
 
-def test_a_motion_is_followed_from_frame_to_frame_over_turns():
+def test_a_motion_is_followed_from_frame_to_frame_over_turns(person):
     """A spin of two turns with a wheeling arm: no frame may jump to another optimum."""
-    person = standing().person
     model = pinocchio_model(person)
     t = np.linspace(0, 1, 120)
     v = np.zeros(model.nv)
@@ -127,9 +225,8 @@ def test_a_motion_is_followed_from_frame_to_frame_over_turns():
 
 
 @pytest.mark.parametrize("label", ["XIPH", "RASIS", "LKNEL", "RELB", "FHEAD"])
-def test_a_wild_marker_hardly_moves_the_pose(label):
+def test_a_wild_marker_hardly_moves_the_pose(person, label):
     """Its pull fades as 1 / distance: 0.025^2 / 0.3, some 2 mm, spread over the segment."""
-    person = standing().person
     q = random_poses(person, 1, 0.2, seed=5)
     markers = np.repeat(markers_of(person, q), 2, axis=0)
     clean = solve_poses(person, markers, q[0], **OPTIONS).q[0]
@@ -144,8 +241,7 @@ def test_a_wild_marker_hardly_moves_the_pose(label):
     assert pulled.max() > 10 * moved.max()  # plain least squares would have bent the body
 
 
-def test_the_posture_prior_holds_what_no_marker_decides():
-    person = standing().person
+def test_the_posture_prior_holds_what_no_marker_decides(person):
     skeleton = person.skeleton
     q = random_poses(person, 1, 0.3, seed=6)
     markers = markers_of(person, q)
@@ -163,8 +259,7 @@ def test_the_posture_prior_holds_what_no_marker_decides():
     )
 
 
-def test_a_prior_of_its_own_for_each_coordinate():
-    person = standing().person
+def test_a_prior_of_its_own_for_each_coordinate(person):
     skeleton = person.skeleton
     q = random_poses(person, 1, 0.3, seed=7)
     q[0, skeleton.q_starts[skeleton.index("shank_l")]] = -0.4
@@ -177,8 +272,7 @@ def test_a_prior_of_its_own_for_each_coordinate():
 
 
 @pytest.mark.parametrize("visible", ["all", "without the pelvis"])
-def test_place_base_lays_the_body_on_its_markers(visible):
-    person = standing().person
+def test_place_base_lays_the_body_on_its_markers(person, visible):
     q = random_poses(person, 1, 0.5, seed=8)[0]
     markers = markers_of(person, q[None])[0]
     if visible != "all":
@@ -189,8 +283,7 @@ def test_place_base_lays_the_body_on_its_markers(visible):
     assert np.abs(away(person, q, placed)).max() < 1e-10
 
 
-def test_rms_counts_only_markers_that_are_there():
-    person = standing().person
+def test_rms_counts_only_markers_that_are_there(person):
     markers = noisy_frames(person, standing().q[None], 0.003, seed=9)
     markers[0, :5] = np.nan
     poses = solve_poses(person, markers, standing().q, **OPTIONS)
@@ -201,25 +294,26 @@ def test_rms_counts_only_markers_that_are_there():
 
 
 @pytest.mark.parametrize("frames", [0, 3])
-def test_no_marker_at_all_is_bad_data(frames):
-    person = standing().person
+def test_no_marker_at_all_is_bad_data(person, frames):
     markers = np.full((frames, len(person.markers), 3), np.nan)
     with pytest.raises(BadDataError, match="no marker"):
         solve_poses(person, markers, standing().q, **OPTIONS)
 
 
-def test_raised_arms_are_found_without_a_neighbour():
+def test_poses_are_found_without_a_neighbour_and_go_on_after_a_gap(person):
     """From the neutral pose alone about one in six of these ends in a wrong optimum."""
-    person = standing().person
     for q in random_poses(person, 30, spread_rad=0.7, seed=5):
-        markers = markers_of(person, q[None])
+        markers = np.repeat(markers_of(person, q[None]), 14, axis=0)
         start = first_pose(person, markers[0], **OPTIONS)
-        poses = solve_poses(person, markers, start, **OPTIONS)
+        alone = solve_poses(person, markers[:1], start, **OPTIONS)
+        assert np.nanmax(alone.residual_m) < 1e-3
+        markers[1:13] = np.nan
+        poses = solve_poses(person, markers, q, **OPTIONS)
         assert np.nanmax(poses.residual_m) < 1e-3
+        np.testing.assert_allclose(poses.q[13], poses.q[0], atol=2e-3)
 
 
-def test_a_trial_is_solved_from_its_best_seen_frame_to_both_ends():
-    person = standing().person
+def test_a_trial_is_solved_from_its_best_seen_frame_to_both_ends(person):
     q = random_poses(person, 1, spread_rad=0.3, seed=6)
     markers = np.repeat(markers_of(person, q), 9, axis=0)
     markers[:4, 5] = np.nan
@@ -229,9 +323,8 @@ def test_a_trial_is_solved_from_its_best_seen_frame_to_both_ends():
     np.testing.assert_allclose(poses.q[0], poses.q[8], atol=2e-3)
 
 
-def test_a_person_who_walks_in_and_out_is_solved_between():
+def test_a_person_who_walks_in_and_out_is_solved_between(person):
     """Whole intervals without any marker at both ends."""
-    person = standing().person
     markers = np.repeat(markers_of(person, standing().q[None]), 12, axis=0)
     markers[:4] = markers[9:] = np.nan
     poses = solve_trial(person, markers, **OPTIONS)
@@ -239,14 +332,3 @@ def test_a_person_who_walks_in_and_out_is_solved_between():
     assert np.isnan(poses.residual_m[[0, 11]]).all()
     assert (poses.coordinate_sd[[0, 11]].max(axis=1) > 1.0).all()
     assert np.isfinite(poses.q).all()
-
-
-def test_after_a_gap_the_pose_goes_on_from_before_it():
-    """From the neutral pose, to which nothing holds a body unseen, one in six would go astray."""
-    person = standing().person
-    for q in random_poses(person, 30, spread_rad=0.7, seed=5):
-        markers = np.repeat(markers_of(person, q[None]), 14, axis=0)
-        markers[1:13] = np.nan
-        poses = solve_poses(person, markers, q, **OPTIONS)
-        assert np.nanmax(poses.residual_m) < 1e-3
-        np.testing.assert_allclose(poses.q[13], poses.q[0], atol=2e-3)

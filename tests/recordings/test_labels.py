@@ -1,25 +1,19 @@
-"""Labels to markers: aliases, prefixes, duplicates, two people."""
+"""Labels to markers: aliases, prefixes, cut and doubled labels, two people, pairs of a joint."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.labels import match_labels
-from bsip_cli.recordings.marker_guess import guess_marker_set
+from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
 from bsip_cli.recordings.read import read_recording
-
-CASE = Path(__file__).parents[2].parent / "shared" / "cases" / "27-underscore-prefix"
+from tests.recordings.recording_writers import write_c3d
 
 WANTED = {"RASIS": ["RASI", "R.ASIS"], "LASIS": ["LASI"], "C7": [], "T10": [], "RCAL": ["RHEE"]}
-
-
-def test_names_aliases_and_case():
-    match = match_labels(["rasi", "LASIS", "C7", "x", "t10", "RHEE"], WANTED)
-    assert match.index == {"RASIS": 0, "LASIS": 1, "C7": 2, "T10": 4, "RCAL": 5}
-    assert match.missing == () and match.findings == ()
 
 
 def test_exact_case_goes_first():
@@ -41,9 +35,17 @@ def test_duplicates_match_nothing_and_are_said():
     assert any("share" in finding.found for finding in match.findings)
 
 
-def test_separators_do_not_count():
-    match = match_labels(["R.ASI", "L_ASI", "c 7", "T-10", "r.heel", "R_HEE"], WANTED)
-    assert match.index == {"RASIS": 0, "LASIS": 1, "C7": 2, "T10": 3, "RCAL": 5}
+@pytest.mark.parametrize(
+    "labels",
+    [
+        ["rasi", "LASIS", "C7", "x", "t10", "RHEE"],
+        ["R.ASI", "L_ASI", "c 7", "", "T-10", "r.heel", "R_HEE"],
+    ],
+)
+def test_names_and_aliases_in_any_case_with_any_separator(labels):
+    match = match_labels(labels, WANTED)
+    assert match.index == {"RASIS": 0, "LASIS": 1, "C7": 2, "T10": 4, "RCAL": len(labels) - 1}
+    assert match.missing == () and match.findings == ()
 
 
 def test_spellings_that_fall_together_match_nothing():
@@ -80,14 +82,10 @@ def test_many_shared_labels_are_refused_with_what_to_do():
     assert "DESCRIPTIONS" in caught.value.remedy and "prefixes" in caught.value.remedy
 
 
-def test_two_people_are_refused_with_the_list():
+def test_two_people_are_refused_with_the_list_unless_a_prefix_chooses():
     labels = [p + m for p in ("A:", "B:") for m in ("RASI", "LASI", "C7", "T10")]
     with pytest.raises(BadDataError, match=r"'A:'.*'B:'"):
         match_labels(labels, WANTED)
-
-
-def test_a_prefix_chooses_between_two_people():
-    labels = [p + m for p in ("A:", "B:") for m in ("RASI", "LASI", "C7", "T10")]
     for wish in ("B:", "B"):
         match = match_labels(labels, WANTED, prefix=wish)
         assert match.prefix == "B:"
@@ -130,8 +128,79 @@ def test_a_set_with_the_affix_in_its_own_labels_keeps_it():
     assert match_labels(list(wanted), wanted).prefix == ""
 
 
-@pytest.mark.skipif(not CASE.is_dir(), reason="the cases of users (../shared/cases) are missing")
-def test_the_case_of_an_underscore():
-    file = CASE / "study" / "sub-01" / "sub-01_task-static.c3d"
+def test_the_case_of_an_underscore(shared_cases):
+    file = shared_cases / "27-underscore-prefix/study/sub-01/sub-01_task-static.c3d"
     guess = guess_marker_set(read_recording(file).labels)
     assert guess.is_shipped and guess.name == "hansen2017"
+
+
+HANSEN = load_marker_set("hansen2017")
+LABELS = [marker.label for marker in HANSEN.markers]
+
+
+@pytest.mark.parametrize("has_descriptions", [True, False])
+def test_cut_labels_lose_only_what_is_doubled_and_not_described(tmp_path, has_descriptions):
+    """Columns are told by their positions."""
+    cut = [label[:4] for label in LABELS]
+    assert len(set(cut)) == 34
+    places = np.tile(0.1 * (1.0 + np.arange(len(cut)))[:, None], (5, 1, 3))
+    parameters = {"DESCRIPTIONS": LABELS} if has_descriptions else None
+    path = write_c3d(tmp_path / "a.c3d", places, cut, point_parameters=parameters)
+    recording = read_recording(path)
+    assert guess_marker_set(recording.labels).name == "hansen2017"
+    match = match_labels(recording.labels, HANSEN.wanted(), optional=HANSEN.optional())
+    doubled = {f"{side}{joint}" for side in "LR" for joint in ("KNEL", "KNEM", "MALL", "MALM")}
+    assert set(match.missing) == (set() if has_descriptions else doubled)
+    columns = recording.markers_m[0, list(match.index.values()), 0]
+    own = [0.1 * (1.0 + LABELS.index(label)) for label in match.index]
+    np.testing.assert_allclose(columns, own, atol=1e-6)
+    shared = [set(f.subject.split(", ")) for f in match.findings if "several columns" in f.found]
+    assert shared == ([] if has_descriptions else [doubled])
+
+
+# Y to the left: the lateral markers lie outside.
+ACROSS_M = {"LKNEL": 0.2, "LKNEM": 0.1, "RKNEL": -0.2, "RKNEM": -0.1, "LASIS": 0.12, "RASIS": -0.12}
+PAIRED = tuple(ACROSS_M)
+
+
+def _standing(stride_m: float = 0.0) -> np.ndarray:
+    """(20, 6, 3); the legs are so far apart fore and aft."""
+    markers = np.zeros((20, len(PAIRED), 3))
+    markers[..., 1] = list(ACROSS_M.values())
+    markers[:, :2, 0] = stride_m
+    return markers
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4, 5], [1, 0, 3, 2, 4, 5], [5, 1, 2, 0, 4, 3]])
+@pytest.mark.parametrize("prefix", ["", "Anna:"])
+@pytest.mark.parametrize("turn_deg", [0.0, 130.0])
+def test_cut_labels_get_their_names_back(order, prefix, turn_deg):
+    turn = Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
+    markers = _standing(0.5)[:, order] @ turn.T
+    labels, (said,) = with_pairs_named([prefix + PAIRED[k][:4] for k in order], markers, HANSEN)
+    assert [label for label in labels if "KNE" in label] == [
+        prefix + PAIRED[k] for k in order if "KNE" in PAIRED[k]
+    ]
+    assert said.level == "corrected" and "LKNE" in said.subject
+
+
+def test_nothing_is_done_where_labels_are_whole():
+    assert with_pairs_named(PAIRED, _standing(), HANSEN) == (PAIRED, [])
+
+
+def test_two_that_change_places_stay_as_they_are():
+    markers = _standing()
+    markers[::2, [0, 1]] = markers[::2, [1, 0]]
+    named, _ = with_pairs_named([name[:4] for name in PAIRED], markers, HANSEN)
+    assert named[:2] == ("LKNE", "LKNE") and named[2:4] == ("RKNEL", "RKNEM")
+
+
+def test_without_the_trunk_nothing_tells():
+    labels = [name[:4] for name in PAIRED[:4]]
+    assert with_pairs_named(labels, _standing()[:, :4], HANSEN)[0] == tuple(labels)
+
+
+def test_three_of_a_label_are_no_pair():
+    labels = ["LKNE", "LKNE", "RKNE", "LKNE", "LASI", "RASI"]
+    named, _ = with_pairs_named(labels, _standing(), HANSEN)
+    assert named.count("LKNE") == 3

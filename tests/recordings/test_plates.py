@@ -1,20 +1,28 @@
-"""What the feet, the weight and the neighbours of a sample say about plates."""
+"""What feet, weight and unloaded stretches say about plates, and the wrench at marker times."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from bsip_cli.recordings.analog import check_samples, spike_samples
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_wrench import nobody_near, plate_zero
+from bsip_cli.recordings.plate_wrench import (
+    lost_baseline,
+    nobody_near,
+    plate_zero,
+    sample_at_frames,
+    silent_frames,
+    subtract_zero,
+    wrench_at_marker_rate,
+)
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.read import lost_zeros, read_recording, sign_doubts
-from tests.circumstances.sound import sound_session
 from tests.recordings import standing_on_two_plates as trials
 from tests.recordings.recording_writers import (
     CORNERS_M,
@@ -33,8 +41,9 @@ def _read(tmp_path, *specs: PlateSpec, **options) -> Recording:
     return read_recording(write_c3d(tmp_path / "a.c3d", markers, labels, specs, **options))
 
 
-def _found(recording: Recording, check: str) -> list[tuple[str, str]]:
-    return [(f.level, f.action) for f in recording.findings if f.check == check]
+def _found(recording: Recording) -> list[tuple[str, str]]:
+    """What is said of centres of pressure."""
+    return [(f.level, f.action) for f in recording.findings if f.check == "plate_cop"]
 
 
 def _swaying(place_m: list[float]) -> np.ndarray:
@@ -43,21 +52,10 @@ def _swaying(place_m: list[float]) -> np.ndarray:
     return place_m + 0.006 * np.column_stack([np.sin(t), np.cos(1.3 * t), 0 * t])
 
 
-def _rotated(points: np.ndarray, axis: int, angle_rad: float) -> np.ndarray:
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turned = points.copy()
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    turned[..., i], turned[..., j] = (
-        c * points[..., i] - s * points[..., j],
-        s * points[..., i] + c * points[..., j],
-    )
-    return turned
-
-
 @pytest.mark.parametrize("kind", [1, 2, 3, 4])
 def test_raised_and_tilted_plates_keep_the_wrench(tmp_path, kind):
     force, moment = standing_wrench(N * RATIO)
-    corners = _rotated(CORNERS_M, 0, 0.05) + np.array([0, 0, 0.02])
+    corners = Rotation.from_euler("x", 0.05).apply(CORNERS_M) + np.array([0, 0, 0.02])
     origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else np.array([0.0, 0.0, -0.04])
     if kind == 1:  # knows a free moment about its own normal only
         corners = CORNERS_M + np.array([0, 0, 0.02])
@@ -93,7 +91,7 @@ def test_an_outline_too_small_is_widened(tmp_path):
     point = _swaying([0.1, 0.2, 0.0])  # under the left foot, beside the outline
     spec = PlateSpec(force, np.cross(point, force), corners_m=small)
     recording = _read(tmp_path, spec)
-    assert [level for level, _ in _found(recording, "plate_cop")][-1] == "corrected"
+    assert [level for level, _ in _found(recording)][-1] == "corrected"
     np.testing.assert_allclose(recording.plates[0].force_N, force, atol=0.01)
     np.testing.assert_allclose(recording.plates[0].moment_Nm, np.cross(point, force), atol=0.02)
     low, high = recording.plates[0].corners_m.min(axis=0), recording.plates[0].corners_m.max(axis=0)
@@ -109,7 +107,7 @@ def test_corners_in_another_order_are_turned_under_the_feet(tmp_path):
     spec.channels = PlateSpec(spec.force_N, spec.moment_Nm, corners_m=large).channels
     spec.corners_m = np.roll(large, 2, axis=0)
     recording = _read(tmp_path, spec)
-    (level, action), *_ = _found(recording, "plate_cop")
+    (level, action), *_ = _found(recording)
     assert level == "corrected" and "180 degrees" in action
     np.testing.assert_allclose(recording.plates[0].force_N, force, atol=0.01)
 
@@ -119,7 +117,7 @@ def test_a_plate_whose_load_lies_nowhere_is_left_out(tmp_path):
     spec = PlateSpec(force, np.cross(_swaying([3.0, -2.0, 0.0]), force))
     recording = _read(tmp_path, spec)
     assert recording.plates == ()
-    ((level, action),) = _found(recording, "plate_cop")
+    ((level, action),) = _found(recording)
     assert level == "excluded" and action.startswith("left the plate out")
 
 
@@ -167,53 +165,6 @@ def test_a_plate_that_was_zeroed_under_the_person_is_no_reversed_one():
     assert lost_zeros(sound, ["1"], recording) == ""
 
 
-def test_spikes_and_lost_samples_are_marked():
-    force, _ = standing_wrench(2000)
-    channels = force + np.random.default_rng(1).normal(0, 1, force.shape)
-    channels[700, 1] += 1e4
-    load = channels[:, 2]
-    assert np.flatnonzero(spike_samples(channels, load)).tolist() == [700]
-    channels[300:330] = 0.0
-    lost = check_samples(channels, channels, load, RATE_HZ).lost
-    assert np.flatnonzero(lost).tolist() == list(range(299, 331))
-
-
-@pytest.mark.parametrize("per_frame", [1, 4, 10])
-@pytest.mark.parametrize("weights", [0.1, 0.5])
-def test_a_spike_of_one_sample_is_found_in_any_movement(per_frame, weights):
-    rng = np.random.default_rng(7)
-    found = []
-    for laboratory in ("walkway", "side-by-side"):
-        session = sound_session(laboratory, 0)
-        for trial in session.trials:
-            force = trial.sampled(100.0, per_frame).force_N[:, 0]
-            force = force + rng.normal(0.0, 0.5, force.shape)
-            for _ in range(5):
-                k, channel = rng.integers(3, len(force) - 3), rng.integers(3)
-                hit = force.copy()
-                hit[k, channel] += weights * 9.81 * session.mass_kg * rng.choice([-1, 1])
-                found.append(np.flatnonzero(spike_samples(hit, hit[:, 2])).tolist() == [k])
-    # At the markers' rate a step may look like one.
-    assert np.mean(found) >= (0.75 if per_frame == 1 else 0.95)
-
-
-def test_a_foot_that_touches_down_is_no_spike():
-    """300 Hz; as a plate of a public recording has it, an impact of one sample's length."""
-    load = np.zeros(300)
-    load[100:] = 600.0 + 50.0 * np.sin(np.arange(200) / 10.0)
-    impact = np.zeros(300)
-    impact[99:106] = [7.7, 35.8, 12.0, -8.2, -25.1, -30.0, -15.0]
-    assert not spike_samples(np.column_stack([impact, load]), load).any()
-
-
-def test_flight_on_a_plate_set_to_zero_is_not_lost():
-    """Down in 50 ms and up in 10."""
-    load = np.interp(np.arange(3000), [950, 1000, 2000, 2010], [700.0, 0.0, 0.0, 700.0])
-    channels = np.column_stack([0 * load, 0 * load, load])
-    assert not check_samples(channels, channels, load, RATE_HZ).lost.any()
-    assert not spike_samples(channels, load).any()
-
-
 def test_kistlers_polynomial_moves_the_centre_of_pressure():
     polynomial = np.zeros((2, 6))
     polynomial[0, 5], polynomial[1, 2] = 0.1, 1e-6
@@ -248,3 +199,151 @@ def test_a_large_zero_counts_where_nobody_is_near():
     assert zero.offset[2] == pytest.approx(300.0)
     under = _plate(np.full(4000, 300.0))
     assert not nobody_near(recording, under).any()
+
+
+OFFSET = np.array([3.0, -2.0, 12.0, 0.5, -0.4, 0.1])
+
+
+def _offset_plate(load_N: np.ndarray) -> Plate:
+    noise = np.random.default_rng(2).normal(0, 1.0, (len(load_N), 6))
+    wrench = OFFSET + noise
+    wrench[:, 2] += load_N
+    return Plate("1", wrench[:, :3], wrench[:, 3:], None, np.ones(len(load_N), bool))
+
+
+def _step() -> np.ndarray:
+    load = np.zeros(4000)
+    load[1000:3000] = 700 * np.sin(np.linspace(0, np.pi, 2000))
+    return load
+
+
+def test_offset_is_found_and_subtracted():
+    plate = _offset_plate(_step())
+    zero = plate_zero(plate, RATE_HZ)
+    assert 1500 < zero.n_samples < 2100 and len(zero.stretches_s) == 2
+    np.testing.assert_allclose(zero.offset, OFFSET, atol=0.3)
+    corrected, finding = subtract_zero(plate, zero)
+    assert finding.level == "corrected"
+    assert abs(np.median(corrected.force_N[:900, 2])) < 0.3
+
+
+def _silent_where(where: np.ndarray, plate: Plate) -> Plate:
+    """As software writes zeros there."""
+    force, moment = (np.where(where[:, None], 0.0, x) for x in (plate.force_N, plate.moment_Nm))
+    return replace(plate, force_N=force, moment_Nm=moment)
+
+
+def test_zeros_that_software_wrote_are_no_reading():
+    plate = _silent_where(_step() == 0, _offset_plate(_step()))
+    zero = plate_zero(plate, RATE_HZ)
+    assert not zero.is_known()
+    assert subtract_zero(plate, zero)[1].found.startswith("exactly 0 without load")
+
+
+def test_zeros_that_do_not_last_are_noise_about_a_threshold():
+    """Software sets to 0 what is below 9 N; the plate reads 12 N with noise of 5 N."""
+    plate = _offset_plate(np.random.default_rng(5).normal(0, 5.0, 4000))
+    low = np.abs(plate.force_N[:, 2]) < 9
+    assert 0.15 < low.mean() < 0.5
+    zero = plate_zero(_silent_where(low, plate), RATE_HZ)
+    assert zero.n_samples > 3500
+    np.testing.assert_allclose(zero.offset[:3], OFFSET[:3], atol=2.5)
+
+
+def test_a_plate_that_is_never_unloaded_keeps_its_zero():
+    plate = _offset_plate(np.full(3000, 350.0))
+    zero = plate_zero(plate, RATE_HZ)
+    assert not zero.is_known()
+    same, finding = subtract_zero(plate, zero)
+    assert same is plate and finding.level == "info"
+
+
+N_LIFT, ZERO = 400, slice(0, 50)
+
+
+def without_baseline(lift_N: np.ndarray):
+    said = lost_baseline(lift_N, "1", np.ones(N_LIFT, bool), ZERO)
+    return lift_N if said is None else lift_N - lift_N[ZERO].mean(), said
+
+
+def lift_step(first_N: float, then_N: float) -> np.ndarray:
+    ramp = np.clip((np.arange(N_LIFT) - 100.0) / 50.0, 0.0, 1.0)
+    return first_N + (then_N - first_N) * ramp
+
+
+@pytest.mark.parametrize(("first_N", "then_N"), [(-250.0, 0.0), (-700.0, -350.0), (-700.0, 4.0)])
+def test_who_steps_off_a_plate_of_the_other_sign_was_no_baseline(first_N, then_N):
+    lift, said = without_baseline(lift_step(first_N, then_N))
+    assert said is None
+    np.testing.assert_array_equal(lift, lift_step(first_N, then_N))
+
+
+@pytest.mark.parametrize(("level_N", "load_N"), [(-2880.0, 800.0), (-300.0, 600.0)])
+def test_a_pull_that_no_person_makes_is_subtracted(level_N, load_N):
+    lift, said = without_baseline(lift_step(level_N, level_N + load_N))
+    assert said.level == "corrected"
+    np.testing.assert_allclose(lift, lift_step(0.0, load_N))
+
+
+FRAMES = 200
+RATES = [(1000.0, 100.0), (2000.0, 120.0), (1000.0, 100.5), (100.0, 100.0), (240.0, 200.0)]
+
+
+def _signal(rate_hz: float, f_hz: float, n: int) -> np.ndarray:
+    return np.sin(2 * np.pi * f_hz * np.arange(n) / rate_hz)[:, None]
+
+
+@pytest.mark.parametrize(("rate", "frame_rate"), RATES)
+def test_constants_pass_exactly_and_slow_signals_without_delay(rate, frame_rate):
+    n = int(FRAMES * rate / frame_rate)
+    signal = np.hstack([np.full((n, 1), 7.5), _signal(rate, 5.0, n)])
+    values, usable = sample_at_frames(signal, np.ones(n, bool), rate, frame_rate, FRAMES)
+    assert usable.all()
+    np.testing.assert_allclose(values[:, 0], 7.5, rtol=1e-12)
+    expected = np.sin(2 * np.pi * 5.0 * np.arange(FRAMES) / frame_rate)
+    np.testing.assert_allclose(values[15:-15, 1], expected[15:-15], atol=0.003)
+
+
+@pytest.mark.parametrize(("rate", "frame_rate"), RATES)
+def test_frames_in_which_software_wrote_zeros(rate, frame_rate):
+    n = int(FRAMES * rate / frame_rate)
+    signal = np.full((n, 6), 300.0)
+    signal[: n // 2] = 0.0
+    values, _ = sample_at_frames(signal, np.ones(n, bool), rate, frame_rate, FRAMES)
+    silent = silent_frames(values, resampled=rate != frame_rate)
+    assert abs(silent.sum() - FRAMES / 2) <= 1 and silent[: FRAMES // 2 - 1].all()
+
+
+def test_what_would_alias_is_gone():
+    values, _ = sample_at_frames(_signal(1000, 93.0, 2000), np.ones(2000, bool), 1000, 100, FRAMES)
+    assert np.abs(values[15:-15]).max() < 0.005
+
+
+def test_slower_forces_are_interpolated():
+    n = FRAMES // 2
+    values, _ = sample_at_frames(_signal(50, 3.0, n), np.ones(n, bool), 50, 100, FRAMES)
+    expected = np.sin(2 * np.pi * 3.0 * np.arange(FRAMES) / 100)
+    np.testing.assert_allclose(values[30:-30, 0], expected[30:-30], atol=0.01)
+
+
+def test_unusable_samples_mark_frames_and_do_not_leak():
+    signal, usable = np.full((2000, 1), 3.0), np.ones(2000, bool)
+    signal[1000:1100], usable[1000:1100] = np.nan, False
+    values, good = sample_at_frames(signal, usable, 1000, 100, FRAMES)
+    assert np.isfinite(values).all()
+    assert not good[100:110].any()
+    assert good[:90].all() and good[120:].all()
+    np.testing.assert_allclose(values[good], 3.0, rtol=1e-12)
+
+
+def test_plates_are_summed():
+    n = 1000
+    plates = tuple(
+        Plate(str(i), np.full((n, 3), i), np.full((n, 3), -i), None, np.ones(n, bool))
+        for i in (1.0, 2.0)
+    )
+    markers = np.zeros((100, 1, 3))
+    recording = Recording(Path("a"), 100.0, ("A",), markers, 1000.0, plates, (), np.eye(3), "", 0.5)
+    wrench = wrench_at_marker_rate(recording)
+    np.testing.assert_allclose(wrench.total, np.tile([3.0] * 3 + [-3.0] * 3, (100, 1)))
+    assert wrench.usable.all()

@@ -1,9 +1,13 @@
+"""Segment inertia by the tables: masses, repairs, editions, and how far people stray from them."""
+
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m
+from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m, strays_of
 from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.people import Inertia, combined, mean_segments
 from tests.body.standing_person import standing
@@ -11,14 +15,9 @@ from tests.body.standing_person import standing
 
 @pytest.mark.parametrize("sex", ["M", "F", "other"])
 @pytest.mark.parametrize("mass_kg", [48.3, 95.0])
-def test_masses_sum_to_the_stated_mass(sex, mass_kg):
+def test_segments_are_physical_and_their_masses_sum_to_the_stated_mass(sex, mass_kg):
     inertias = regress(standing(sex).person, sex, mass_kg).inertias
     assert sum(body.mass_kg for body in inertias) == pytest.approx(mass_kg, rel=1e-12)
-
-
-@pytest.mark.parametrize("sex", ["M", "F", "other"])
-def test_all_segments_are_physical(sex):
-    inertias = regress(standing(sex).person, sex, 70.0).inertias
     assert all(body.is_physical() for body in inertias)
     for body in inertias:
         principal = np.sort(np.linalg.eigvalsh(body.tensor_kgm2))
@@ -27,22 +26,16 @@ def test_all_segments_are_physical(sex):
 
 
 @pytest.mark.parametrize(("sex", "noted"), [("M", set()), ("F", {"upper_torso"})])
-def test_only_the_female_torso_is_repaired(sex, noted):
+def test_only_the_female_torso_is_repaired_by_less_than_a_tenth(sex, noted):
     person = standing(sex).person
     result = regress(person, sex, 70.0)
     named = {s for s, note in zip(person.skeleton.segments, result.notes, strict=True) if note}
     assert named == noted
     assert all("nearest possible" in note for note in result.notes if note)
-
-
-def test_the_repair_changes_the_female_torso_by_less_than_a_tenth():
-    person = standing("F").person
-    at = person.skeleton.index("upper_torso")
-    body = regress(person, "F", 70.0).inertias[at]
-    printed = load_table("dumas2007")["F", "torso"].gyration
-    printed = body.mass_kg * person.lengths_m[at] ** 2 * printed
-    moved = np.linalg.norm(body.tensor_kgm2 - printed) / np.linalg.norm(printed)
-    assert 0 < moved < 0.1
+    for at in map(person.skeleton.index, noted):
+        body, row = result.inertias[at], load_table("dumas2007")[sex, "torso"]
+        printed = body.mass_kg * person.lengths_m[at] ** 2 * row.gyration
+        assert 0 < np.linalg.norm(body.tensor_kgm2 - printed) < 0.1 * np.linalg.norm(printed)
 
 
 @pytest.mark.parametrize("sex", ["M", "F"])
@@ -169,3 +162,66 @@ def test_the_table_of_2015_differs_in_the_torso_alone():
     old, new = load_table("dumas2007"), load_table("dumas2015")
     differ = {key for key in old if not np.array_equal(old[key].gyration, new[key].gyration)}
     assert differ == {("M", "torso"), ("F", "torso"), ("other", "torso")}
+
+
+ROWS = ("pelvis", "torso", "head", "arm", "forearm", "hand", "thigh", "shank", "foot")
+AVERAGE = 24.1  # body-mass index mass_strays the sample
+
+
+def mass_strays(sex: str, mass_kg: float, stature_m: float) -> dict[str, float]:
+    return dict(zip(ROWS, strays_of(sex, mass_kg, stature_m, ROWS).mass, strict=True))
+
+
+@pytest.mark.parametrize("sex", ["M", "F", "other"])
+def test_every_segment_has_spreads_as_published_regressions_leave(sex):
+    strays = strays_of(sex, AVERAGE * 1.7**2, 1.7, ROWS)
+    assert strays.outside == ""
+    assert np.all((strays.mass > 5) & (strays.mass < 25))
+    assert np.all((strays.moments > 10) & (strays.moments < 40))
+
+
+def test_centres_are_told_along_limbs_alone():
+    com = strays_of("M", 75.0, 1.78, ROWS).com
+    told = np.argwhere(np.isfinite(com))
+    along = {ROWS[i]: int(axis) for i, axis in told}
+    assert along == dict.fromkeys(ROWS[2:], 1) | {"foot": 0}
+    assert np.nanmax(com) < 4
+
+
+def test_the_sample_s_mean_person_has_what_people_and_tables_stray_by():
+    assert mass_strays("M", 73.0, 1.741)["thigh"] == pytest.approx(np.hypot(7.0, 9.9), rel=1e-3)
+
+
+def test_the_other_sex_lies_between():
+    man, woman, other = (mass_strays(sex, 73.0, 1.741) for sex in ("M", "F", "other"))
+    for row in ROWS:
+        assert min(man[row], woman[row]) <= other[row] <= max(man[row], woman[row])
+
+
+def test_heavy_people_stray_further_and_are_named():
+    strays = strays_of("M", 110.0, 1.75, ROWS)
+    assert "body-mass index 36 kg/m2" in strays.outside
+    average = strays_of("M", AVERAGE * 1.75**2, 1.75, ROWS)
+    assert np.all(strays.mass > average.mass)
+    assert strays.mass[ROWS.index("head")] > 2 * average.mass[ROWS.index("head")]
+
+
+def test_a_child_s_head_is_that_of_no_adult():
+    small, tall, adult = (strays_of("M", m, h, ROWS) for m, h in [(21, 1.16), (40, 1.5), (65, 1.7)])
+    head = ROWS.index("head")
+    assert small.mass[head] > 150 > tall.mass[head] > 40 > adult.mass[head]
+    assert "1.16 m tall" in small.outside and "1.50 m tall" in tall.outside
+    assert adult.outside == ""
+
+
+@pytest.mark.parametrize(
+    ("sex", "mass_kg", "stature_m", "said"),
+    [
+        ("F", 45.0, 1.68, "body-mass index 16 kg/m2"),
+        ("F", 52.0, 1.52, ""),
+        ("M", 52.0, 1.52, "1.52 m tall"),
+    ],
+)
+def test_who_is_outside_the_sample_is_named(sex, mass_kg, stature_m, said):
+    outside = strays_of(sex, mass_kg, stature_m, ROWS).outside
+    assert said in outside and bool(said) == bool(outside)

@@ -1,13 +1,28 @@
-"""Valid windows on constructed steps: on and off plates, chair, flight, belt, no outline."""
+"""Valid windows of steps on and off plates, the plate that bears each foot, and real trials."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
-from bsip_cli.recordings.contacts import PlateLoad, contact_windows, foot_contacts
+from bsip_cli.recordings.contacts import (
+    ContactWindows,
+    PlateLoad,
+    Reading,
+    contact_windows,
+    foot_contacts,
+    foot_forces,
+    plate_loads,
+    plate_noise,
+)
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
+from bsip_cli.recordings.read import read_recording
 
 RATE_HZ = 100.0
 N = 300
@@ -106,32 +121,20 @@ def test_a_chair_is_named():
 def test_flight_is_valid():
     t = np.arange(N) / RATE_HZ
     flying = (t > 1.0) & (t < 1.4)
-    since = np.clip(t - 1.0, 0, 0.4)
-    height = 1.0 + 0.2 * GRAVITY * since - GRAVITY * since**2 / 2
-    force = np.where(flying, 0.0, WEIGHT_N)
     push = (np.abs(t - 0.9) < 0.1) | (np.abs(t - 1.5) < 0.1)
-    height[push & (t < 1)] += 0.0
-    result = _windows(
-        _foot(0.1, np.where(flying, 0.2, 0)),
-        _foot(0.4, np.where(flying, 0.2, 0)),
-        [_plate(force + push * 0.98 * WEIGHT_N)],
-        _trunk(_pushed(t, force + push * 0.98 * WEIGHT_N)),
-    )
+    force = np.where(flying, 0.0, WEIGHT_N) + push * 0.98 * WEIGHT_N
+    speed = np.cumsum(force / MASS_KG - GRAVITY) / RATE_HZ
+    height = 1.0 + np.cumsum(speed) / RATE_HZ
+    feet = (_foot(x, np.where(flying, 0.2, 0)) for x in (0.1, 0.4))
+    result = _windows(*feet, [_plate(force)], _trunk(height))
     assert result.valid[105:135].all()
     assert not result.on_ground["l"][105:135].any()
 
 
-def _pushed(t: np.ndarray, force_N: np.ndarray) -> np.ndarray:
-    """Height of a mass under this force."""
-    speed = np.cumsum(force_N / MASS_KG - GRAVITY) / RATE_HZ
-    return 1.0 + np.cumsum(speed) / RATE_HZ
-
-
 def test_a_box_before_a_landing_is_no_flight():
-    force = np.where(np.arange(N) < 120, 0.0, WEIGHT_N)
-    lift = np.where(np.arange(N) < 120, 0.3, 0.0)
-    result = _windows(_foot(0.1, lift), _foot(0.4, lift), [_plate(force)])
-    assert not result.valid[:110].any()
+    on_box = np.arange(N) < 120
+    feet = (_foot(x, np.where(on_box, 0.3, 0.0)) for x in (0.1, 0.4))
+    assert not _windows(*feet, [_plate(np.where(on_box, 0.0, WEIGHT_N))]).valid[:110].any()
 
 
 def test_a_belt_moves_the_foot():
@@ -209,3 +212,161 @@ def test_without_a_mass_nothing_is_valid_and_the_reason_is_said():
     result = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N)], mass_kg=None)
     assert not result.valid.any() and result.on_plate["l"].all()
     assert any("neither a stated mass" in reason.found for reason in result.reasons)
+
+
+LEFT, RIGHT = np.array([0.0, 0.1, 0.0]), np.array([0.0, -0.1, 0.0])
+OUTLINE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
+ASIDE, AHEAD = np.array([0.0, 0.2, 0.0]), np.array([1.0, 0.0, 0.0])
+YES = np.ones(N, bool)
+
+
+def still_foot(at: np.ndarray) -> np.ndarray:
+    """Heel, toe and ankle (N, 3, 3)."""
+    points = at + np.array([[-0.08, 0.0, 0.02], [0.12, 0.0, 0.02], [-0.04, 0.0, 0.08]])
+    return np.tile(points, (N, 1, 1))
+
+
+def steady_load(at: np.ndarray, newton=300.0) -> np.ndarray:
+    force = np.zeros((N, 3))
+    force[:, 2] = newton
+    return np.hstack([force, np.cross(at, force)])
+
+
+FEET = {"l": still_foot(LEFT), "r": still_foot(RIGHT)}
+BOTH = {"l": YES, "r": YES}
+
+
+def told(plates, on_ground=BOTH, on_plate=BOTH):
+    return foot_forces(plates, FEET, on_ground, on_plate, RATE_HZ)
+
+
+@pytest.mark.parametrize("has_outlines", [True, False])
+def test_each_foot_gets_the_wrench_of_its_own_plate(has_outlines):
+    """Told by the outlines, or by the loads alone."""
+    left, right = steady_load(LEFT, 400.0), steady_load(RIGHT, 300.0)
+    outlines = (OUTLINE - ASIDE, OUTLINE + ASIDE) if has_outlines else (None, None)
+    found = told([Reading(right, outlines[0]), Reading(left, outlines[1])])
+    np.testing.assert_allclose(found.wrench["l"], left)
+    np.testing.assert_allclose(found.wrench["r"], right)
+
+
+def test_a_foot_on_two_plates_gets_both():
+    halves = [
+        Reading(steady_load(LEFT + x * AHEAD, 200.0), OUTLINE + ASIDE + y * AHEAD)
+        for x, y in ((-0.05, -0.3), (0.05, 0.3))
+    ]
+    found = told([*halves, Reading(steady_load(RIGHT), OUTLINE - ASIDE)])
+    np.testing.assert_allclose(found.wrench["l"][:, 2], 400.0)
+    np.testing.assert_allclose(found.wrench["r"][:, 2], 300.0)
+
+
+@pytest.mark.parametrize("outline", [OUTLINE, None])
+def test_a_plate_under_both_feet_tells_of_neither(outline):
+    found = told([Reading(steady_load((LEFT + RIGHT) / 2, 700.0), outline)])
+    assert np.isnan(found.wrench["l"]).all() and np.isnan(found.wrench["r"]).all()
+    words = (
+        "both feet are on one plate"
+        if outline is not None
+        else ("no foot is clearly under a plate's load")
+    )
+    assert found.unknown["l"][words].all()
+
+
+def test_weight_that_shifts_over_a_plate_without_outline_is_no_foots():
+    """Now over the left foot, now over the right one: both stand on it."""
+    course = steady_load(LEFT, 700.0)
+    course[N // 2 :] = steady_load(RIGHT, 700.0)[N // 2 :]
+    found = told([Reading(course, None)])
+    assert np.isnan(found.wrench["l"]).all() and np.isnan(found.wrench["r"]).all()
+
+
+def test_a_foot_in_the_air_bears_nothing_and_one_beside_is_unknown():
+    air = {"l": YES, "r": ~YES}
+    plate = Reading(steady_load(LEFT, 700.0), OUTLINE + ASIDE)
+    found = told([plate], air, air)
+    assert (found.wrench["r"] == 0.0).all() and np.isfinite(found.wrench["l"]).all()
+    beside = told([plate], BOTH, air)
+    assert np.isnan(beside.wrench["r"]).all() and np.isfinite(beside.wrench["l"]).all()
+    assert np.isnan(told([], BOTH, BOTH).wrench["l"]).all()
+
+
+def test_a_broken_sample_is_not_zero():
+    wrench = steady_load(LEFT, 700.0)
+    wrench[50] = np.nan
+    found = told([Reading(wrench, OUTLINE + ASIDE)], {"l": YES, "r": ~YES}, BOTH)
+    assert np.isnan(found.wrench["l"][50]).all() and np.isfinite(found.wrench["l"][60]).all()
+
+
+def test_noise_of_a_loaded_plate_is_its_white_noise():
+    sd = np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+    at = np.array([0.5, 0.4, 0.0])
+    t = np.arange(20000) / 1000.0
+    wrench = np.random.default_rng(2).normal(size=(len(t), 6)) * sd
+    wrench[:, 2] += 700 + 100 * np.sin(2 * np.pi * t)
+    wrench[:, 3:] += np.cross(at, wrench[:, :3])
+    np.testing.assert_allclose(plate_noise(Reading(wrench, None), at), sd, rtol=0.05)
+
+
+OPENCAP = (r"L_(calc|toe|5meta)", r"r_(calc|toe|5meta)", r"C7|[Lr]\.(ASIS|PSIS)|[LR]_Shoulder")
+HAMNER = (r"L(CAL|TOE|MT5)", r"R(CAL|TOE|MT5)", r"C7|CLAV|.ACR|.ASI|.PSI")
+BIOBUDDY = (r"L(CAL|MFH5|MFH1|TT2)", r"R(CAL|MFH5|MFH1|TT2)", r"C7|T10|SUP|[LR](ASIS|PSIS)")
+PIG = (r"L(HEE|TOE|ANK)", r"R(HEE|TOE|ANK)", r"C7|T10|CLAV|STRN|[LR](ASI|PSI)|SACR")
+
+
+def _columns(recording: Recording, pattern: str) -> list[int]:
+    return [i for i, label in enumerate(recording.labels) if re.fullmatch(pattern, label)]
+
+
+def _real_windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> ContactWindows:
+    recording = read_recording(path)
+    left, right, trunk = (recording.markers_m[:, _columns(recording, name)] for name in names)
+    loads = plate_loads(recording, wrench_at_marker_rate(recording))
+    rate_hz = recording.marker_rate_hz
+    feet = foot_contacts({"l": left, "r": right}, rate_hz, loads, recording.n_frames)
+    return contact_windows(feet, trunk, mass_kg, rate_hz)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize(
+    ("name", "markers", "mass_kg", "least"),
+    [
+        ("opencap_subject4/static1.trc", OPENCAP, 60.0, 1.0),
+        ("opencap_subject4/squats1.trc", OPENCAP, 60.0, 1.0),
+        ("hamner_other/run200.trc", HAMNER, 72.6, 0.98),
+        ("biobuddy_ech/anat_pose_ECH.c3d", BIOBUDDY, 66.0, 0.98),
+        ("biobuddy_ech/right_knee.c3d", BIOBUDDY, 66.0, 0.98),
+    ],
+)
+def test_all_contacts_on_plates(real_data, name, markers, mass_kg, least):
+    assert _real_windows(real_data / name, markers, mass_kg).valid.mean() >= least
+
+
+@pytest.mark.real
+def test_chair_is_named(real_data):
+    windows = _real_windows(real_data / "opencap_subject4/STS1.trc", OPENCAP, 60.0)
+    assert 0.4 < windows.valid.mean() < 0.7
+    assert any("seat" in finding.found for finding in windows.reasons)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["DJ1", "DJ2"])
+def test_box_before_the_drop_is_left_out_and_the_landing_kept(real_data, name):
+    windows = _real_windows(real_data / f"opencap_subject4/{name}.trc", OPENCAP, 60.0)
+    assert not windows.valid[:100].any()
+    assert windows.valid[125:].all()
+
+
+@pytest.mark.real
+def test_first_and_last_steps_of_gait_are_left_out(real_data):
+    path = real_data / "btk_pig/PiG_Motion-FlatFoot-Full.c3d"
+    windows = _real_windows(path, PIG, 46.3)
+    assert 0.1 < windows.valid.mean() < 0.3
+    assert not windows.valid[:80].any() and not windows.valid[-80:].any()
+
+
+@pytest.mark.real
+def test_unloaded_belt_has_its_offset(real_data):
+    recording = read_recording(real_data / "biobuddy_ech/right_knee.c3d")
+    loaded, unloaded = (plate_zero(p, recording.analog_rate_hz) for p in recording.plates)
+    assert not loaded.is_known()
+    assert unloaded.offset[2] == pytest.approx(9.0, abs=0.2)

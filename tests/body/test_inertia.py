@@ -1,3 +1,7 @@
+"""Inertia of bodies: its parametrisations, the nearest physical one, and loads as points."""
+
+from __future__ import annotations
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,6 +14,8 @@ from bsip_cli.body.inertia import (
     readable_jacobian,
     second_moments,
 )
+from bsip_cli.body.person import load_parameters
+from tests.body.standing_person import standing
 
 
 def random_body(rng):
@@ -28,14 +34,11 @@ def body(request):
     return random_body(np.random.default_rng(request.param))
 
 
-def test_phi_is_pinocchios(body):
+def test_round_trips(body):
+    """Between parameters in Pinocchio's order and those that people read."""
     inertia, _ = body
     theirs = pin.Inertia(inertia.mass_kg, inertia.com_m, inertia.tensor_kgm2)
     np.testing.assert_allclose(inertia.phi(), theirs.toDynamicParameters(), rtol=1e-13)
-
-
-def test_round_trips(body):
-    inertia, _ = body
     for back in (from_phi(inertia.phi()), from_readable(inertia.readable())):
         assert back.mass_kg == pytest.approx(inertia.mass_kg, rel=1e-14)
         np.testing.assert_allclose(back.com_m, inertia.com_m, rtol=1e-13)
@@ -126,3 +129,28 @@ def test_nothing_physical_is_nearer_than_the_nearest():
             values, axes = np.linalg.eigh(candidate)
             candidate = axes @ np.diag(np.maximum(values, floor)) @ axes.T
             assert np.linalg.norm(candidate - moments) >= distance * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("segment", ["shank_r", "upper_torso"])
+def test_parameters_of_a_point_about_the_joint(segment):
+    person = standing().person
+    torso = person.skeleton.index("upper_torso")
+    assert np.linalg.norm(person.origin_in_joint_m[torso]) > 0.3  # its origin is not its joint
+    i = person.skeleton.index(segment)
+    position_m = np.array([0.02, -0.15, 0.03])
+    phi = load_parameters([(segment, 1.5, position_m)], person).reshape(-1, 10)
+    x, y, z = r = position_m + person.origin_in_joint_m[i]
+    moments = [y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
+    np.testing.assert_allclose(phi[i], 1.5 * np.array([1.0, *r, *moments]), rtol=1e-12)
+    assert not np.delete(phi, i, axis=0).any()
+
+
+def test_loads_add_up():
+    person = standing().person
+    one = ("hand_l", 0.5, (0.0, -0.05, 0.0))
+    two = ("hand_l", 0.3, (0.02, -0.07, 0.01))
+    both = load_parameters([one, two], person)
+    np.testing.assert_allclose(
+        both, load_parameters([one], person) + load_parameters([two], person)
+    )
+    assert not load_parameters([], person).any()

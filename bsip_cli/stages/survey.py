@@ -59,8 +59,8 @@ def run(unit: Unit) -> None:
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         _say_height(unit, seen)
-        if fault := other_bodies({one.name: one.sizes for one in seen}):
-            unit.say(fault)
+        if said := other_bodies({one.name: one.sizes for one in seen}):
+            unit.say(said)
         stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
         read = partial(_surveyed, unit, mine, limits)
         reading = reading_of_files(seen, read, *stated, limits)

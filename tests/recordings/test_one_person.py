@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.one_person import other_bodies, sizes_of
+from bsip_cli.recordings.read import open_recording
 
 LABELS = [
     "LASI",
@@ -49,3 +50,20 @@ def test_skin_makes_no_other_person():
 def test_too_few_segments_show_nothing():
     few = dict([*trial(1.12).items()][:3])
     assert other_bodies({"static": few, "walk": trial()}) == ""
+
+
+@pytest.mark.real
+@pytest.mark.parametrize(
+    ("files", "is_one"),
+    [
+        *((f"zoo_children/{child}-*.c3d", True) for child in ("HC031A", "HC039A")),
+        *((f"{lab}/*.c3d", True) for lab in ("biobuddy_ech", "golf_french")),
+        *((f"{lab}/*.trc", True) for lab in ("opencap_subject4", "hamner_other")),
+        ("btk_pig/*.c3d", False),
+        ("zoo_children/*-static.c3d", False),
+    ],
+)
+def test_public_recordings_of_one_person_and_of_several(real_data, files, is_one):
+    recordings = [open_recording(path).recording for path in sorted(real_data.glob(files))]
+    sizes = {one.path.stem: sizes_of(one.labels, one.markers_m) for one in recordings}
+    assert len(sizes) > 1 and (other_bodies(sizes) == "") == is_one

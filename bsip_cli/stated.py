@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -33,6 +34,7 @@ class Quantity:
     guessed: tuple[str, ...]
     slips: tuple[str, ...]
     names: str
+    example: str
     guessed_low: float = 0.0
 
     def holds(self, value: float) -> bool:
@@ -54,6 +56,7 @@ MASS = Quantity(
     ("kg", "g"),
     "mass weight bodymass bodyweight masse gewicht körpergewicht koerpergewicht körpermasse "
     "koerpermasse poids peso massa massecorporelle",
+    "62.6 kg, 138 lb or 9 st 12 lb",
 )
 HEIGHT = Quantity(
     "height_m",
@@ -65,6 +68,7 @@ HEIGHT = Quantity(
     ("m", "cm", "mm", "in"),
     "height stature bodyheight grösse größe groesse körpergrösse körpergröße koerpergroesse "
     "taille talla altura estatura altezza statura",
+    "1.68 m, 168 cm or 5 ft 6 in",
     0.75,  # the median at one year (WHO 2006), before which children do not walk: 66 are inches
 )
 _SPELLINGS = {
@@ -81,8 +85,11 @@ _SPELLINGS = {
 }
 _DIGITS = 6  # of a kg or m: 163 cm are 1.63 m
 _SPELT = {spelling: unit for unit, line in _SPELLINGS.items() for spelling in line.split()}
-_BELOW = {"ft": "in", "st": "lb"}  # the unit of a second number that has none, as in 5'4
+# The unit of a second number that has none, as in 5'4, and how many make the first one.
+_BELOW = {"ft": ("in", 12), "st": ("lb", 14), "m": ("cm", 100)}
+_QUOTES = str.maketrans("‘’′´`“”″", "'''''\"\"\"")
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
+_WITH_POINT = re.compile(r"\s*(\d+)[.,](\d{1,2})(?!\d)")
 _PART = re.compile(rf"\s*({_NUMBER})\s*((?:[^\W\d_]+|''|['\"])?)\.?", re.IGNORECASE)
 
 
@@ -95,21 +102,31 @@ class Reading:
     is_stated: bool
 
 
-def readings_of(text: str, quantity: Quantity, unit: str = "") -> tuple[Reading, ...]:
+def readings_of(
+    text: str, quantity: Quantity, unit: str = "", column: Collection[str] = ()
+) -> tuple[Reading, ...]:
     """What a cell may mean, within what people have; nothing if it is no number of this kind.
 
     ``unit`` is the column's; the one of the cell goes before it. A value that can be in the stated
-    unit (SI, where none is) has this reading alone.
+    unit (SI, where none is) has this reading alone, unless 5.11 ft may be 5 ft 11 in: another cell
+    of the ``column``, as 5.75, shows that it is not.
     """
+    text, stated = text.translate(_QUOTES), unit or quantity.unit
     parts = _parts(text)
-    if any(spelt for _, spelt in parts):
-        whole = _sum(parts, quantity)
-        return () if whole is None else _within(quantity, [(whole, quantity.unit)], True)
-    if len(parts) != 1:
+    is_spelt = any(spelt for _, spelt in parts)
+    if is_spelt:
+        whole, stated = _sum(parts, quantity), _SPELT.get(parts[0][1].casefold(), "")
+        first = [] if whole is None else [(whole, stated if len(parts) == 1 else quantity.unit)]
+    elif len(parts) == 1:
+        first = [(parts[0][0] * quantity.units[stated], stated)]
+    else:
         return ()
-    number, stated = parts[0][0], unit or quantity.unit
-    if first := _within(quantity, [(number * quantity.units[stated], stated)], True):
-        return first
+    if found := _within(quantity, first, True):
+        is_one = len(parts) > 1 or any(_is_decimal(one, stated, quantity) for one in column)
+        return found + _within(quantity, [] if is_one else _as_two(text, stated, quantity), False)
+    if is_spelt:
+        return ()
+    number = parts[0][0]
     others = quantity.guessed if not unit else quantity.slips if unit in quantity.slips else ()
     guessed = ((number * quantity.units[u], u) for u in others)
     likely = [one for one in guessed if one[0] >= quantity.guessed_low]
@@ -119,6 +136,26 @@ def readings_of(text: str, quantity: Quantity, unit: str = "") -> tuple[Reading,
 def _within(quantity: Quantity, values, is_stated: bool) -> tuple[Reading, ...]:
     near = ((round(value, _DIGITS), unit) for value, unit in values if quantity.holds(value))
     return tuple(Reading(value, unit, is_stated) for value, unit in near)
+
+
+def _as_two(text: str, unit: str, quantity: Quantity) -> list[tuple[float, str]]:
+    """What 5.11 in feet or stones is [SI] if the point stands between two units; 5.1 may be 5.10
+    of a spreadsheet."""
+    match, (below, many) = _WITH_POINT.match(text), _BELOW.get(unit, ("", 0))
+    if match is None or below not in quantity.units or unit == quantity.unit:
+        return []
+    first, numbers = int(match[1]) * quantity.units[unit], {match[2], match[2].ljust(2, "0")}
+    return [
+        (first + n * quantity.units[below], f"{unit} and {below}")
+        for n in sorted(map(int, numbers))
+        if 0 < n < many
+    ]
+
+
+def _is_decimal(text: str, unit: str, quantity: Quantity) -> bool:
+    """Whether what stands behind the point can be no number of the unit below."""
+    behind = re.match(r"\s*\d+[.,]\d*[1-9]", text)
+    return behind is not None and not _as_two(text, unit, quantity)
 
 
 def _parts(text: str) -> list[tuple[float, str]]:
@@ -138,10 +175,14 @@ def _sum(parts: list[tuple[float, str]], quantity: Quantity) -> float | None:
     """A number with its unit, or two as in 5 ft 4 in [SI]; None where units are not understood."""
     units = [_SPELT.get(spelt.casefold(), "") for _, spelt in parts]
     if len(parts) > 1 and not parts[-1][1]:
-        units[-1] = _BELOW.get(units[-2], "")
+        units[-1] = _BELOW.get(units[-2], ("", 0))[0]
+        if units[-1] == "cm" and parts[-1][0] < 10:  # 1m6 is 1.6 m to some
+            return None
     if any(unit not in quantity.units for unit in units):
         return None
-    if any(_BELOW.get(one) != other for one, other in pairwise(units)):
+    if any(_BELOW.get(one, ("", 0))[0] != other for one, other in pairwise(units)):
+        return None
+    if any(n >= _BELOW[unit][1] for (n, _), unit in zip(parts[1:], units, strict=False)):
         return None
     return sum(n * quantity.units[u] for (n, _), u in zip(parts, units, strict=True))
 
@@ -193,56 +234,140 @@ def with_other(rows: Mapping[str, Row]) -> dict[str, Row]:
     return {**rows, OTHER: mean}
 
 
-COLUMN_NAMES = "sex gender sexe sexo sesso geschlecht genre genero género"
+# Titles of such a column in each language, and pairs of words, a woman's first; a third is neither.
+_LANGUAGES = (
+    ("sex gender", "female male other, woman man, women men, girl boy"),
+    ("sexo genero género", "mujer hombre, mujer varón, femenino masculino"),
+    ("sexo genero género", "mulher homem, feminino masculino"),
+    ("sexe genre", "femme homme, féminin masculin, fille garçon"),
+    ("sesso genere", "femmina maschio, femminile maschile, donna uomo"),
+    ("geschlecht", "weiblich männlich divers, weiblich maennlich divers, frau mann, frau herr"),
+    ("", "vrouw man, vrouwelijk mannelijk"),
+    ("", "kvinna man"),
+    ("", "kvinde mand"),
+    ("", "kvinne mann"),
+    ("", "nainen mies"),
+    ("", "naine mees"),
+    ("", "kobieta mężczyzna, kobieta mezczyzna"),
+    ("", "žena muž"),
+    ("", "ženska moški, žensko muško"),
+    ("", "nő férfi"),
+    ("", "femeie bărbat, feminin masculin"),
+    ("", "kadın erkek, kadin erkek"),
+    ("", "moteris vyras"),
+    ("", "sieviete vīrietis"),
+    ("", "γυναίκα άνδρας, θήλυ άρρεν"),
+    ("", "женский мужской, женщина мужчина, жен муж"),
+    ("", "perempuan laki-laki, wanita pria"),
+    ("", "女 男, 女性 男性"),
+)
+COLUMN_NAMES = " ".join(dict.fromkeys(" ".join(titles for titles, _ in _LANGUAGES).split()))
+_OTHERS = (
+    "n/a na none unknown diverse nonbinary non-binary intersex autre andere otro altro outro ? -"
+)
+_OTHER_LETTERS = "o u"  # unless they begin a word of the column's language
 
-_WORDS: dict[Sex, str] = {
-    "F": "f female females fem woman women girl w weiblich weibl frau mädchen maedchen femme "
-    "féminin feminin féminine fille mujer femenino femenina hembra femmina femminile donna "
-    "feminino feminina mulher vrouw vrouwelijk kvinna kvinde kvinne nainen kobieta жен женский "
-    "女 女性",
-    "M": "m male males masc man men boy h männlich maennlich männl mann herr homme masculin "
-    "garçon hombre masculino varón varon maschio maschile uomo homem mannelijk manlig mies "
-    "mężczyzna муж мужской 男 男性",
-    "other": "o other n/a na none unknown divers diverse nonbinary non-binary intersex autre "
-    "andere otro altro outro ? -",
+_Pair = dict[str, Sex]
+
+
+def _plain(text: str) -> str:
+    """Without accents, where that leaves a word."""
+    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    return bare if len(bare) > 2 else text
+
+
+def _pair(words: str) -> _Pair:
+    sexes: tuple[Sex, ...] = ("F", "M", OTHER)
+    both = dict(zip(words.split(), sexes, strict=False))
+    return both | {_plain(word): sex for word, sex in both.items()}
+
+
+_PAIRS = [(k, _pair(words)) for k, (_, line) in enumerate(_LANGUAGES) for words in line.split(",")]
+_SEX_OF: dict[str, Sex] = {
+    **{
+        word: sex for _, pair in _PAIRS for word, sex in pair.items() if len(word) > 1 or word > "z"
+    },
+    **dict.fromkeys(("", *_OTHERS.split()), OTHER),
+    **dict.fromkeys(["hembra", "mädchen", "maedchen"], "F"),
 }
-_SEX_OF: dict[str, Sex] = {word: sex for sex, words in _WORDS.items() for word in words.split()}
-_PAIR = re.compile(r"([\w?-]+)\s*[=:]\s*([\w/?-]+)")
+_CODE = re.compile(r"([\w?-]+)\s*[=:]\s*([\w/?-]+)")
 
 
-def sex_of(cell: str, legend: Mapping[str, Sex], column: Collection[str] = ()) -> Sex | None:
+def sex_of(
+    cell: str, legend: Mapping[str, Sex], column: Collection[str] = (), title: str = "sex"
+) -> Sex | None:
     """The sex that a cell means; "other" where it says n/a or nothing; None if it cannot be known.
 
+    A word means itself. The beginning of one, such as M or F, means what it does in the language of
+    its column: in the title's, where that understands all cells, else in every one that does.
+
     legend : what the codes of the table mean, as header or participants.json say.
-    column : the column's cells in small letters: next to H (hombre, homme) an M may be mujer.
+    column : all cells.
     """
-    word = re.sub(r"^(\d+)[.,]0+$", r"\1", cell.strip())  # 1.0, as tables of numbers keep a 1
-    if (known := legend.get(word) or legend.get(word.casefold())) is not None:
+    codes = {code.casefold(): sex for code, sex in legend.items()}
+    meant, *others = (_cell(text) for text in (cell, *column))
+    if (known := codes.get(meant, _SEX_OF.get(meant))) is not None:
         return known
-    meant = word.casefold().rstrip(".")
-    if meant == "m" and "h" in column:
-        return None
-    return _SEX_OF.get(meant) if meant else "other"
+    cells = {meant, *others} - {*codes}
+    found = {_meaning(meant, pair) for pair in _spoken(cells, title)}
+    return found.pop() if len(found) == 1 else None
+
+
+def _cell(text: str) -> str:
+    word = re.sub(r"^(\d+)[.,]0+$", r"\1", text.strip())  # 1.0, as tables of numbers keep a 1
+    return word.casefold().rstrip(".")
+
+
+def _meaning(cell: str, pair: _Pair) -> Sex | None:
+    """Of the beginning of a word; None where the pair does not have it, or both words begin so."""
+    found = {sex for word, sex in pair.items() if word.startswith(cell)}
+    if not found and cell in _OTHER_LETTERS.split():
+        return OTHER
+    return found.pop() if len(found) == 1 else None
+
+
+def _spoken(cells: Collection[str], title: str) -> list[_Pair]:
+    """The pairs of words that may stand behind a column's cells, in small letters.
+
+    Each understands all cells that are no words, and its language has all words. Hombre shows that
+    M is mujer: those go before the others that have words to which a cell may be the other one.
+    What begins no word of any, as 2 or X, is a mistake of its own.
+    """
+    words = {cell for cell in cells if _SEX_OF.get(cell, OTHER) != OTHER}
+    begun = {cell for cell in cells if cell not in _SEX_OF}
+    begun = {cell for cell in begun if any(_meaning(cell, pair) for _, pair in _PAIRS)}
+    fitting = [
+        (k, pair)
+        for k, pair in _PAIRS
+        if all(_meaning(cell, pair) for cell in begun)
+        and words <= {word for other, one in _PAIRS if other == k for word in one}
+    ]
+    own = [(k, pair) for k, pair in fitting if title.casefold() in _LANGUAGES[k][0].split()]
+    pairs = [pair for _, pair in own or fitting]
+    alone = {word for word in words if not word.startswith(tuple(begun))}
+    shown = [len(alone & {*pair}) for pair in pairs]
+    return [pair for pair, n in zip(pairs, shown, strict=True) if n == max(shown)]
 
 
 def legend_in(text: str) -> dict[str, Sex]:
     """Codes and their meaning in a text like ``0=F, 1=M`` or ``female: 2, male: 1``."""
-    return legend_of(dict(_PAIR.findall(text)))
+    return legend_of(dict(_CODE.findall(text)))
 
 
 def legend_of(pairs: Mapping[str, str]) -> dict[str, Sex]:
     """What codes mean, whichever of code and word stands first."""
-    legend: dict[str, Sex] = {}
-    for one, other in pairs.items():
-        if (sex := _sex_in(other)) is not None:
-            legend[one.strip()] = sex
-        elif (sex := _sex_in(one)) is not None:
-            legend[other.strip()] = sex
-    return legend
+    for codes, texts in ((pairs.keys(), pairs.values()), (pairs.values(), pairs.keys())):
+        named = {
+            code.strip(): sex
+            for code, text in zip(codes, texts, strict=True)
+            if (sex := _sex_in(text, [*texts])) is not None
+        }
+        if named:
+            return named
+    return {}
 
 
-def _sex_in(text: str) -> Sex | None:
-    """The one sex that a text names: its only word of those known."""
-    words = (text, *re.findall(r"\w+", text))
-    found = {_SEX_OF[word] for w in words if (word := w.strip().casefold()) in _SEX_OF}
-    return found.pop() if len(found) == 1 else None
+def _sex_in(text: str, texts: Collection[str]) -> Sex | None:
+    """The one sex that a text names: as a cell among others, or by its only word of those known."""
+    found = {_SEX_OF[w] for w in re.findall(r"\w+", text.casefold()) if w in _SEX_OF}
+    return found.pop() if len(found) == 1 else sex_of(text, {}, texts)

@@ -14,6 +14,7 @@ from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Interval
+from bsip_cli.recordings.one_person import odd_ones
 from bsip_cli.recordings.written import FORCE_UNITS_N, force_unit
 from bsip_cli.stated import BMI_KG_M2, percent_apart
 
@@ -237,6 +238,28 @@ def differing_plates(
         action += "are wrong while both plates bear the person"
         findings.append(Finding("plate_force", name, found, expected, action, "warning"))
     return findings
+
+
+def differing_trials(trials: Mapping[str, Sequence[Interval]], apart_percent: float) -> str:
+    """Which trials show a mass grossly other than that which most show; empty if none.
+
+    apart_percent : what may differ beside the intervals.
+    """
+    every = {name: measured_mass({name: some}, _PERCENT) for name, some in trials.items()}
+    shown = {name: one for name, one in every.items() if one.is_known}
+    if len(shown) < 2:
+        return ""
+    usual, odd = odd_ones(
+        [*shown], lambda one, two: _are_apart(shown[one], shown[two], apart_percent)
+    )
+    if not odd:
+        return ""
+    others = " and ".join(f"{shown[name].mass_kg:.1f} kg in {name}" for name in odd)
+    return (
+        f"the plates show {others}, and {shown[usual].mass_kg:.1f} kg in {usual}: another person "
+        "or a load is on them there, or something bears the person; remove what is another "
+        "person's, and state a load"
+    )
 
 
 def plate_gains(

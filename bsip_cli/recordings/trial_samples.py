@@ -18,6 +18,7 @@ from scipy.special import logsumexp
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Balance, Body, GateLimits
+from bsip_cli.recordings.one_person import Sizes, sizes_of
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     FrameChange,
@@ -225,7 +226,7 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be. ``course`` : to compare it with that of others.
+    another ``delay``, of each that may be. ``course`` and ``sizes`` : to compare it with others.
     """
 
     name: str
@@ -243,10 +244,13 @@ class TrialSamples:
     delay: Delay = NO_DELAY
     late: tuple[TrialSamples, ...] = ()
     course: Course = field(default_factory=Course)
+    sizes: Sizes = field(default_factory=dict)
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
+        recording = opened.recording
+        stated = replace(stated, sizes=sizes_of(recording.labels, recording.markers_m))
         found = lags(opened, limits) if stated.sources else None
         if found is None:
             return replace(stated, course=Course.of(opened)) if stated.sources else stated

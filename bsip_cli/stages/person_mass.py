@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.recordings.measured_mass import Comparison, MeasuredMass, measured_mass
+from bsip_cli.recordings.measured_mass import (
+    Comparison,
+    MeasuredMass,
+    differing_trials,
+    measured_mass,
+)
 from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import load_words
@@ -68,6 +73,9 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     measured = measured_mass(
         intervals, unit.config.ingest.mass_half_width_percent, height_m, static
     )
+    alone = {t.stem: intervals[t.stem] for t in trials if not load_words(unit, t)}
+    if fault := differing_trials(alone, unit.config.ingest.mass_gross_percent):
+        unit.say(fault)
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""

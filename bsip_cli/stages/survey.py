@@ -19,6 +19,7 @@ from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.measured_mass import plate_gains
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import Interval
+from bsip_cli.recordings.one_person import other_bodies
 from bsip_cli.recordings.plate_reading import FrameChange, Opened, PlateReading
 from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
@@ -58,6 +59,8 @@ def run(unit: Unit) -> None:
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         _say_height(unit, seen)
+        if said := other_bodies({one.name: one.sizes for one in seen}):
+            unit.say(said)
         stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
         read = partial(_surveyed, unit, mine, limits)
         reading = reading_of_files(seen, read, *stated, limits)

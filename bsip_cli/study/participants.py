@@ -5,9 +5,8 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 from pathlib import Path
 
@@ -206,11 +205,10 @@ class PeopleTable:
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
 
-    @cached_property
-    def sexes(self) -> frozenset[str]:
-        """All that stands in that column, in small letters."""
-        k = self.columns["sex"].index
-        return frozenset(row.cells[k].casefold() for row in self.rows if k < len(row.cells))
+    def cells_of(self, name: str) -> frozenset[str]:
+        """All that stands in that column of the contract."""
+        k = self.columns[name].index
+        return frozenset(row.cells[k] for row in self.rows if k < len(row.cells))
 
 
 def named_in(file: Path) -> list[str]:
@@ -312,9 +310,11 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
             remedy=points if is_split else "write n/a where something is unknown",
         )
     cells = {name: row.cells[column.index] for name, column in table.columns.items()}
-    sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
-    faults = [] if sex else [_sex_fault(cells["sex"], row.id)]
-    mass, height = (_Found(cells.get(q.column, ""), q, table.columns) for q in (MASS, HEIGHT))
+    written, legend, sexes = cells["sex"], table.columns["sex"].legend, table.cells_of("sex")
+    title = re.split(r"[\W_]", table.columns["sex"].title)[0]
+    sex = sex_of(written, legend, sexes, title)
+    faults = [] if sex else [_sex_fault(written, row.id, sexes)]
+    mass, height = (_Found(cells.get(q.column, ""), q, table) for q in (MASS, HEIGHT))
     _decide(mass, height)
     faults += [one.fault(row.id) for one in (mass, height) if one.is_lost]
     if faults:
@@ -329,6 +329,13 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
     if odd := odd_pair(mass.value, height.value):
         notes.append(f"{table.file}: {row.id}: {odd}")
     assert sex is not None
+    if sex_of(written, legend, (), title) not in (None, sex):
+        taken = {"M": "male", "F": "female"}.get(sex, sex)
+        beside = " and ".join(sorted(repr(other) for other in sexes - {written}))
+        notes.append(
+            f"{table.file}: sex {written} of {row.id} is taken as {taken}, as it is in the "
+            f"language of {beside} in that column; write words if it is not"
+        )
     return Participant(row.id, sex, mass.value, height.value, notes=tuple(notes))
 
 
@@ -336,53 +343,64 @@ _Clauses = tuple[str, str, str]
 """What was found, what was expected, what to do."""
 
 
-def _sex_fault(text: str, name: str) -> _Clauses:
-    remedy = "write one of them"
+def _sex_fault(text: str, name: str, column: Collection[str]) -> _Clauses:
+    remedy = (
+        "write words in the whole column, as female and male: letters count where one language has "
+        "all that stands there, "
+    ) + ", ".join(sorted(map(repr, column)))
     if text.strip().isdigit():
         remedy = (
             "write words, or say what the numbers mean, which differs between laboratories: in the "
             'header, as in "sex (0=F, 1=M)", or as Levels in participants.json'
         )
-    elif text.strip().casefold() == "m":
-        remedy = "write mujer or man: next to H an M may be either"
     return f"sex {text!r} of {name}", "M, F, other or n/a", remedy
 
 
 class _Found:
     """A cell with a mass or a height, and what it may mean."""
 
-    def __init__(self, text: str, quantity: Quantity, columns: Mapping[str, Column]) -> None:
-        column = columns.get(quantity.column)
+    def __init__(self, text: str, quantity: Quantity, table: PeopleTable) -> None:
+        column = table.columns.get(quantity.column)
         self.text, self.quantity = text.strip(), quantity
         self.title, self.unit = (column.title, column.unit) if column else (quantity.column, "")
         self.is_known = self.text.casefold() not in UNKNOWN
         self.readings: tuple[Reading, ...] = ()
         if self.is_known:
-            self.readings = readings_of(self.text, quantity, self.unit)
+            others = table.cells_of(column.name) if column else ()
+            self.readings = readings_of(self.text, quantity, self.unit, others)
+        self.possible = self.readings
 
     @property
     def is_lost(self) -> bool:
-        """Whether something is written there that has no meaning, or several."""
-        return self.is_known and len(self.readings) != 1
+        """Whether something is written there that has no meaning, or several of which none is
+        the stated one."""
+        said = [one for one in self.readings if one.is_stated]
+        return self.is_known and len(said or self.readings) != 1
 
     @property
     def value(self) -> float | None:
         return self.readings[0].value if self.readings else None
 
     def notes(self, name: str) -> list[str]:
-        if not self.readings or self.readings[0].is_stated:
+        taken, unit = self.readings[0] if self.readings else None, self.quantity.unit
+        others = [one for one in self.possible if one != taken]
+        if taken is None or (taken.is_stated and not others):
             return []
-        (taken,) = self.readings
+        reason = f"since it cannot be in {self.unit or unit}"
+        if any(one.is_stated for one in self.possible):
+            also = " or ".join(f"{one.value:.4g} {unit} ({one.unit})" for one in others)
+            doubt = "it may also be" if len(self.readings) > 1 else "by the body-mass index not"
+            reason = f"{doubt} {also}: write {self.quantity.example}"
         return [
             f"{self.title} {self.text} of {name} is taken as {taken.unit}: {taken.value:.4g} "
-            f"{self.quantity.unit}, since it cannot be in {self.unit or self.quantity.unit}"
+            f"{unit}, {reason}"
         ]
 
     def fault(self, name: str) -> _Clauses:
         q, factor = self.quantity, self.quantity.units[self.unit or self.quantity.unit]
         unit = f" {self.unit}" if self.unit not in ("", q.unit) else ""
         expected = f"a number between {q.low / factor:.4g} and {q.high / factor:.4g}{unit}, or n/a"
-        remedy = "correct it"
+        remedy = f"correct it, as in {q.example}"
         if self.readings:
             may_be = " or ".join(f"{one.value:.4g} {q.unit} ({one.unit})" for one in self.readings)
             remedy = f"write the unit: it may be {may_be}"

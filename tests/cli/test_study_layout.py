@@ -249,6 +249,30 @@ def test_dialects(empty_study, table, said):
 
 
 @pytest.mark.parametrize(
+    ("cells", "taken", "said"),
+    [
+        (["72.6 5.11"], [1.557528], ["it may also be 1.803 m (ft and in)"]),
+        (["72.6 5.1"], [1.55448], ["1.549 m (ft and in) or 1.778 m (ft and in)"]),
+        (["102 5.11"], [1.8034], ["as ft and in: 1.803 m, by the body-mass index not 1.558 m"]),
+        (["72.6 5.11", "80 5.75"], [1.557528, 1.7526], []),  # decimal feet, as 5.75 shows
+        (["72.6 5’11”", "80 5′9″", "70 1m68"], [1.8034, 1.7526, 1.68], []),
+        (["72.6 1m6", "80 5-6"], [], []),
+    ],
+)
+def test_feet_and_inches(empty_study, cells, taken, said):
+    for k in range(1, len(cells) + 1):
+        (empty_study / f"sub-{k:02d}").mkdir(exist_ok=True)
+        (empty_study / f"sub-{k:02d}" / f"sub-{k:02d}_task-static.c3d").write_bytes(b"")
+    rows = [f"sub-{k:02d} M {cell}".replace(" ", "\t") for k, cell in enumerate(cells, 1)]
+    table = "\n".join(["id\tsex\tmass_kg\theight (ft)", *rows, ""])
+    found, notes, refusals = people(empty_study, table)
+    assert [height for *_, height in found] == pytest.approx(taken)
+    assert len(notes) == len(said) and all(map(str.__contains__, notes, said))
+    assert [r for r in refusals if "5 ft 6 in" not in r] == []
+    assert len(found) + len(refusals) == len(cells)
+
+
+@pytest.mark.parametrize(
     ("sexes", "legend", "read"),
     [
         ("female male woman man", "", "FMFM"),
@@ -263,6 +287,17 @@ def test_dialects(empty_study, table, said):
         ("1.0 2.0", " (1=F; 2=M)", "FM"),
         ("M F", " (M/F)", "MF"),
         ("a b", " (a = weiblich / b = männlich)", "FM"),
+        # a letter is the beginning of a word in the language of its column
+        ("M Varón", "", "FM"),
+        ("Hombre M", "", "MF"),
+        ("H M n/a", "", ["M", "F", "other"]),
+        ("F M Hombre", "", "FMM"),
+        ("F férfi", "", "MM"),
+        ("K M", "", "FM"),
+        ("K E", "", "FM"),
+        ("M Ž", "", "MF"),
+        ("m w d", "", ["M", "F", "other"]),
+        ("M F U", "", ["M", "F", "other"]),
     ],
 )
 def test_sexes(empty_study, sexes, legend, read):
@@ -284,9 +319,10 @@ def sexes_of(root: Path, sexes: str, legend: str = "") -> tuple[list[str], list[
     [
         ("0", "say what the numbers mean"),
         ("1 2", "say what the numbers mean"),
-        ("H M", "mujer or man"),
-        ("V", "write one of them"),  # vrouw, varón
-        ("D", "write one of them"),  # donna, divers
+        ("V M", "write words in the whole column"),  # vrouw, varón, vyras
+        ("M F N", "write words in the whole column"),
+        ("Mujer M", "write words in the whole column"),  # mujer or masculino
+        ("D", "write words in the whole column"),  # donna, divers
     ],
 )
 def test_sexes_that_may_be_either_are_refused(empty_study, sexes, remedy):

@@ -12,6 +12,7 @@ from bsip_cli.recordings.measured_mass import (
     Comparison,
     MeasuredMass,
     differing_plates,
+    differing_trials,
     least_mass,
     mass_finding,
     measured_mass,
@@ -161,6 +162,14 @@ def test_trials_that_disagree_show_nothing_but_for_a_static_one(other_kg):
     found = measured_mass(trials, 10.0, static={"static"})
     assert found.mass_kg == pytest.approx(62.0, abs=0.1)
     assert "the static trial counts" in found.words()
+
+
+@pytest.mark.parametrize(("other_kg", "is_said"), [(62.0, False), (66.0, False), (84.0, True)])
+def test_a_trial_with_another_mass_is_named_with_both(other_kg, is_said):
+    trials = {"static": told(other_kg), "walk": told(62.0), "squat": told(62.0)}
+    said = differing_trials(trials, 15.0)
+    assert bool(said) == is_said
+    assert not is_said or said.startswith("the plates show 84.0 kg in static, and 62.0 kg in walk")
 
 
 def test_a_trial_that_shows_nothing_does_not_spoil_the_others():

@@ -94,6 +94,20 @@ def test_three_of_a_stem_are_a_cluster_and_only_track(stem):
     assert len(found) == 3 and {meaning.landmark for meaning in found.values()} == {""}
 
 
+def test_a_word_is_not_understood_by_its_letters():
+    labels = [f"{word}_{side}" for word in ("bark", "palec", "armbage") for side in "LPVH"]
+    assert meanings(["C7", *labels]).keys() == {"C7"}
+
+
+@pytest.mark.parametrize("sides", ["GD", "ID", "SD", "ED"])
+def test_english_words_with_the_sides_of_another_language(sides):
+    left, right = sides
+    words = ("ASI", "PSI", "KNE", "ANK", "HEE", "THI")
+    found = meanings([f"{s}{word}" for s in sides for word in words])
+    assert found[f"{left}THI"].segment == "thigh_l" and found[f"{right}THI"].segment == "thigh_r"
+    assert found[f"{right}KNE"].landmark == "knee_lateral_r"
+
+
 def test_drawn_frames_are_no_markers():
     found = meanings(["LHEE", "LHDF0", "LHDF1", "LHDF2", "LHDF3", "LFHD"])
     assert set(found) == {"LHEE", "LFHD"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.recordings.marker_guess import with_pairs_named
+from bsip_cli.recordings.marker_guess import told_from, with_numbers_placed, with_pairs_named
 
 SET = load_marker_set("hansen2017")
 # Y to the left: the lateral markers lie outside.
@@ -53,3 +53,36 @@ def test_three_of_a_label_are_no_pair():
     labels = ["LKNE", "LKNE", "RKNE", "LKNE", "LASI", "RASI"]
     named, _ = with_pairs_named(labels, _markers(), SET)
     assert named.count("LKNE") == 3
+
+
+def test_a_ghost_is_no_medial_marker():
+    markers = _markers()
+    markers[:, 1] += [0.15, 0.03, -0.06]
+    named, _ = with_pairs_named([name[:4] for name in NAMES], markers, SET)
+    assert named[:2] == ("LKNE", "LKNE") and named[2:4] == ("RKNEL", "RKNEM")
+
+
+NUMBERED = ("LKNE1", "LKNE2", "RKNE1", "RKNE2", "LASIS", "RASIS")
+
+
+def _placed(markers: np.ndarray, labels=NUMBERED) -> tuple[dict[str, str], list]:
+    marker_set, said = with_numbers_placed(labels, markers, told_from(labels).marker_set)
+    return {marker.label: marker.landmark for marker in marker_set.markers}, said
+
+
+def test_places_tell_numbered_ones():
+    outer_first, nothing = _placed(_markers())
+    assert outer_first["LKNE1"] == "knee_lateral_l" and outer_first["RKNE2"] == "knee_medial_r"
+    inner_first, (said,) = _placed(_markers()[:, [1, 0, 3, 2, 4, 5]])
+    assert inner_first["LKNE2"] == "knee_lateral_l" and inner_first["RKNE1"] == "knee_medial_r"
+    assert nothing == [] and "the outer ones for LKNE2, RKNE2" in said.action
+
+
+def test_numbered_ones_that_are_no_pair_are_no_landmarks():
+    markers = _markers()
+    markers[:, 1] += [0.15, 0.03, -0.06]
+    markers[::2, [2, 3]] = markers[::2, [3, 2]]
+    found, said = _placed(markers)
+    assert "LKNE1" not in found and "LKNE2" not in found
+    assert found["RKNE1"] == found["RKNE2"] == ""
+    assert [one.subject for one in said] == ["LKNE1, LKNE2", "RKNE1, RKNE2"]

@@ -121,6 +121,13 @@ def meaning_of(label: str) -> Meaning | None:
     return _meanings([bare]).get(bare)
 
 
+def is_no_marker(label: str) -> bool:
+    """Whether a label's words say that it is a joint centre or what else a program computed, or a
+    thing."""
+    ways = (_ways(split(label)[1], language) for language in _languages() if not language.telltales)
+    return any(min(one, key=lambda way: way[1])[0] is None for one in ways if one)
+
+
 def bones(labels: Sequence[str]) -> int:
     """How many landmarks some labels name, taken as they are."""
     return len({meaning.landmark for meaning in _meanings(labels).values()} - {""})

@@ -14,7 +14,14 @@ import numpy as np
 from bsip_cli.body.joint_centres import breadth_m
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set, shipped_names
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.label_words import Meaning, are_numbered, bones, meanings, medial_of
+from bsip_cli.recordings.label_words import (
+    Meaning,
+    are_numbered,
+    bones,
+    is_no_marker,
+    meanings,
+    medial_of,
+)
 from bsip_cli.recordings.labels import (
     affixes,
     columns_of,
@@ -118,7 +125,10 @@ class Guess:
         bony = [f"{m.label} = {in_words(m.landmark)}" for m in markers if m.landmark]
         tracking = sum(not m.landmark for m in markers)
         near = f"; {self.base.marker_set.name} fits partly" if self.base else ""
-        unknown = f"; not understood: {', '.join(self.unknown)}" if self.unknown else ""
+        none = [label for label in self.unknown if is_no_marker(label)]
+        strange = [label for label in self.unknown if label not in none]
+        unknown = f"; not understood: {', '.join(strange)}" if strange else ""
+        unknown += f"; no markers on the body: {', '.join(none)}" if none else ""
         expected = "one of " + ", ".join(shipped_names())
         action = f"made one from the labels: {', '.join(bony)}; {tracking} more only track{unknown}"
         made = Finding("labels", "", f"no shipped set fits well{near}", expected, action, "warning")

@@ -161,3 +161,13 @@ def test_sets_of_real_recordings(real_data, name, expected):
 def test_real_recordings_of_no_shipped_set(real_data, name):
     with pytest.raises(BadDataError, match="no known marker set fits"):
         guess_marker_set(read_recording(real_data / name).labels)
+
+
+def test_numbered_labels_of_one_stem_sit_on_one_segment():
+    markers = load_marker_set("opencap_subject4").markers
+    labels = [f"{m.label}_study" for m in markers if m.segment != "hand_l"]
+    guess = guess_marker_set([*labels, "r_sh1_study", "L_sh1_study", "RHJC_study", "Wand7Q_study"])
+    segments = {marker.label: marker.segment for marker in guess.marker_set.markers}
+    assert segments["r_sh1"] == "shank_r" and segments["L_sh1"] == "shank_l"
+    (said,) = guess.findings()
+    assert said.action.endswith("not understood: Wand7Q; no markers on the body: RHJC")

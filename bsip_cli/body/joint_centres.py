@@ -242,6 +242,11 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     return JointCentres(centres, axes, limbs.hinges, limbs.ends, tuple(notes))
 
 
+def breadth_m(landmark: str, stature_m: float) -> float:
+    """The mean breadth at the joint of a lateral landmark."""
+    return 2 * _HALF_BREADTH[landmark.partition("_")[0]] * stature_m
+
+
 def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.ndarray] | None:
     """Hip joint centres (3,) [m] by side, from the pelvis alone; None without its landmarks."""
     behind = _mean(landmarks, ("psis_l", "psis_r", "sacrum"))

@@ -15,7 +15,14 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.labels import LabelMatch, match_labels
-from bsip_cli.recordings.marker_guess import Guess, fits, starter_toml, told_from, with_pairs_named
+from bsip_cli.recordings.marker_guess import (
+    Guess,
+    fits,
+    starter_toml,
+    told_from,
+    with_numbers_placed,
+    with_pairs_named,
+)
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.segments import in_words, without_side
@@ -47,8 +54,10 @@ def markers_command(file: Path, marker_set: str, prefix: str, write: Path | None
 
 def _compared(recording: Recording, chosen: MarkerSet, prefix: str) -> bool:
     """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
-    labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, prefix)
-    _say([finding.sentence() for finding in paired])
+    seen_as = recording.labels, recording.markers_m
+    chosen, placed = with_numbers_placed(*seen_as, chosen, prefix)
+    labels, paired = with_pairs_named(*seen_as, chosen, prefix)
+    _say([finding.sentence() for finding in (*placed, *paired)])
     seen = np.isfinite(recording.markers_m[..., 0]).any(axis=0)
     how = {"optional": chosen.optional(), "seen": seen, "prefix": prefix}
     match = match_labels(labels, chosen.wanted(), **how)

@@ -22,6 +22,9 @@ _MOST_WORDS, _LONGEST = 7, 60  # of a label that is understood: words, character
 _SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
 _ACROSS = 0.5  # cost of a word that reaches across a separator,
 _LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
+_LETTERS = (
+    3  # of a part that stand for a word each, the side among them; less one beside longer words
+)
 _ALONE = 1.0  # cost of a side whose other side no label has
 _SPECIAL = 0.98  # of the worth of a language that extends another: it must say more
 _NUMBER_LEFT, _TRACKS = 0.1, 0.2  # cost of a meaning that leaves a number aside, or is no bone
@@ -93,8 +96,8 @@ def meanings(labels: Sequence[str]) -> dict[str, Meaning]:
 
     What all labels of a person begin or end with does not count, and all are read in the one
     language that understands most of them. Of several labels that seem to be one landmark the
-    plainest has it, the others track; three or more that differ by a number are a cluster and only
-    track.
+    plainest has it, the others track; two that differ by a number are the lateral and the medial
+    one of a joint, whichever is which; three or more are a cluster and only track.
     """
     return dict(_of_everybody(tuple(labels)))
 
@@ -116,6 +119,13 @@ def meaning_of(label: str) -> Meaning | None:
     """One label's meaning, or None; a prefix ``Subject:`` does not count."""
     bare = split(label)[1]
     return _meanings([bare]).get(bare)
+
+
+def is_no_marker(label: str) -> bool:
+    """Whether a label's words say that it is a joint centre or what else a program computed, or a
+    thing."""
+    ways = (_ways(split(label)[1], language) for language in _languages() if not language.telltales)
+    return any(min(one, key=lambda way: way[1])[0] is None for one in ways if one)
 
 
 def bones(labels: Sequence[str]) -> int:
@@ -170,12 +180,27 @@ def _decided(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
 
     holders: dict[str, str] = {}
     for label in sorted(found, key=plainness):
-        if stems[found[label], _stem(label)] < _CLUSTER:
-            holders.setdefault(found[label].landmark, label)
+        landmark, stem = found[label].landmark, _stem(label)
+        if stems[found[label], stem] < _CLUSTER:
+            holder = holders.setdefault(landmark, label)
+            if are_numbered(holder, label):
+                holders.setdefault(medial_of(landmark), label)
+    held = {label: landmark for landmark, label in holders.items()}
     return {
-        label: meaning if holders.get(meaning.landmark) == label else replace(meaning, landmark="")
-        for label, meaning in found.items()
+        label: replace(meaning, landmark=held.get(label, "")) for label, meaning in found.items()
     }
+
+
+def medial_of(landmark: str) -> str:
+    """The medial side of a lateral landmark's joint; empty where there is none."""
+    other = landmark.replace("_lateral_", "_medial_")
+    return other if other != landmark and other in LANDMARKS else ""
+
+
+def are_numbered(one: str, other: str) -> bool:
+    """Whether two labels differ in the number at their end only."""
+    stem = _stem(one)
+    return one != other and stem not in (one, other) and _stem(other) == stem
 
 
 def _stem(label: str) -> str:
@@ -245,15 +270,26 @@ def _spelling(label: str) -> _Spelling:
 
 
 def _cuts(
-    spelling: _Spelling, start: int, language: _Language, words_left: int
+    spelling: _Spelling, start: int, language: _Language, words_left: int, before: str = ""
 ) -> Iterator[_Reading]:
+    """All ways; ``before`` is what the words before have of the same part, a dot for each letter
+    that stands for itself and a dash for longer ones."""
     if start == len(spelling.text):
         yield _Reading((), "", 0.0)
         return
     if not words_left:
         return
+    before = "" if start in spelling.seams else before
+    nouns = _grammar().segments.keys()
     for end, concepts, side, cost in _words_at(spelling, start, language):
-        for rest in _cuts(spelling, end, language, words_left - 1):
+        is_letter = end - start == 1
+        so_far = before + ("." if is_letter else "" if side else "-")
+        # Else words of other languages are understood by letters, or by one that is left over.
+        if so_far.count(".") + ("-" in so_far) > _LETTERS or (
+            is_letter and "-" in before and nouns & {*concepts}
+        ):
+            continue
+        for rest in _cuts(spelling, end, language, words_left - 1, so_far):
             if not (side and rest.side):
                 yield _Reading(
                     (*concepts, *rest.concepts),

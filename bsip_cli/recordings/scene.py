@@ -58,8 +58,8 @@ _SIDED_PARTS = {
 }
 
 # Ends of segments: the distance between them changes less than that to the other side's other end.
-# In 71 pairs of public trials that move by 50 mm (in six tenths of the frames) it changes by 0.36 of
-# that at most, from pelvis to knee, which no segment joins, by 1.7 times (squats).
+# In 71 pairs of public trials that move by 50 mm (in six tenths of all frames) it changes by 0.36
+# of that at most, from pelvis to knee, which no segment joins, by 1.7 times (squats).
 _LIMBS = {
     "thighs": ("asis", "knee_lateral"),
     "shanks": ("knee_lateral", "malleolus_lateral"),

@@ -22,7 +22,7 @@ from bsip_cli.recordings.contacts import (
 )
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
 from bsip_cli.recordings.labels import match_labels
-from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
+from bsip_cli.recordings.marker_guess import guess_marker_set, with_numbers_placed, with_pairs_named
 from bsip_cli.recordings.measured_mass import (
     differing_plates,
     least_mass,
@@ -45,14 +45,16 @@ def run(unit: Unit) -> None:
     recording = assemble(opened(unit, unit.own_trial, session.written, session.gains()), session)
     marker_set, about_set = _marker_set(unit, recording)
     prefix, seen = prefix_of(unit), np.isfinite(recording.markers_m[..., 0]).any(axis=0)
-    labels, paired = with_pairs_named(recording.labels, recording.markers_m, marker_set, prefix)
+    seen_as = recording.labels, recording.markers_m
+    marker_set, placed = with_numbers_placed(*seen_as, marker_set, prefix)
+    labels, paired = with_pairs_named(*seen_as, marker_set, prefix)
     recording = replace(recording, labels=labels)
     how = {"optional": marker_set.optional(), "seen": seen, "prefix": prefix}
     match = match_labels(recording.labels, marker_set.wanted(), **how)
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *about_set, *paired, *match.findings, *repeats]
+    findings = [*recording.findings, *about_set, *placed, *paired, *match.findings, *repeats]
     zeros: dict[str, list[float]] = {}
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed, zeros = without_zeros(recording)

@@ -70,24 +70,48 @@ def test_what_is_only_calm_is_not_clipped(calm):
     assert not clipped(calm).any()
 
 
-def repeated(monkeypatch, **forces):
-    monkeypatch.setattr(copies, "lift_N", lambda source: source.force)
-    usable = np.ones(len(TIME_S), bool)
-    trial = {n: SimpleNamespace(force=f, usable=usable) for n, f in forces.items()}
+def repeated(**forces):
+    """Names of repeats; a force (n,), or that and its place (n,) along X."""
+    usable, trial = np.ones(len(TIME_S), bool), {}
+    for name, force in forces.items():
+        load, place_m = force if isinstance(force, tuple) else (force, 0.0)
+        wrench = np.zeros((len(TIME_S), 6))
+        wrench[:, 2], wrench[:, 4] = load, -load * place_m
+        trial[name] = SimpleNamespace(
+            usable=usable,
+            parts=lambda wrench=wrench: wrench,
+            matrix=lambda _: np.eye(6),
+            floor_m=lambda: 0.0,
+        )
     return copies.repeated_plates([trial])
 
 
-def test_a_sum_is_known_by_most_samples_and_two_feet_are_no_copy(monkeypatch):
+def test_a_sum_is_known_by_most_samples_and_two_feet_are_no_copy():
     one, other = step(), quiet_then_moving()
     total = one + other
     damaged = one.copy()
     damaged[1200:1230] = 0.0  # lost on the plate, not on the virtual one
-    assert repeated(monkeypatch, a=damaged, b=other, c=total) == {"c": ("a", "b")}
+    assert repeated(a=damaged, b=other, c=total) == {"c": ("a", "b")}
     little = 0.01 * other  # a plate that bears hardly anything belongs to the sum all the same
-    assert repeated(monkeypatch, a=one, b=little, c=one + little) == {"c": ("a", "b")}
-    assert repeated(monkeypatch, a=one, b=damaged) == {"b": ("a",)}
-    assert repeated(monkeypatch, a=one, b=np.roll(one, 700)) == {}
-    assert repeated(monkeypatch, a=other, b=1.03 * other) == {}
+    assert repeated(a=one, b=little, c=one + little) == {"c": ("a", "b")}
+    assert repeated(a=one, b=damaged) == {"b": ("a",)}
+    assert repeated(a=one, b=np.roll(one, 700)) == {}
+    assert repeated(a=other, b=1.03 * other) == {}
+
+
+def test_what_bears_load_at_the_same_place_is_one_plate():
+    total = quiet_then_moving()
+    one = total * (0.5 + 0.3 * np.sin(3 * TIME_S))
+    other = total - one
+    sway_m = 0.02 * np.sin(TIME_S)
+    left, right = (one, 0.2 + sway_m), (other, -0.2 + sway_m)
+    middle_m = (one * left[1] + other * right[1]) / total
+    assert repeated(a=left, b=right) == {}
+    assert repeated(a=left, b=(1.03 * one, 0.21 + sway_m)) == {"b": ("a",)}
+    assert repeated(a=left, b=right, c=(1.03 * total, middle_m)) == {"c": ("a", "b")}
+    assert repeated(a=left, b=right, c=(0.3 * total, middle_m)) == {}  # a foot between two others
+    late = np.where(np.arange(len(other)) > len(other) // 2, other, 0.0)
+    assert repeated(a=(other - late, sway_m), b=(late, sway_m)) == {}  # never loaded at once
 
 
 def touching_down(rate_hz: float = 1000.0) -> np.ndarray:

@@ -9,7 +9,12 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.labels import match_labels
-from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
+from bsip_cli.recordings.marker_guess import (
+    guess_marker_set,
+    told_from,
+    with_numbers_placed,
+    with_pairs_named,
+)
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import write_c3d
 
@@ -204,3 +209,36 @@ def test_three_of_a_label_are_no_pair():
     labels = ["LKNE", "LKNE", "RKNE", "LKNE", "LASI", "RASI"]
     named, _ = with_pairs_named(labels, _standing(), HANSEN)
     assert named.count("LKNE") == 3
+
+
+def test_a_ghost_is_no_medial_marker():
+    markers = _standing()
+    markers[:, 1] += [0.15, 0.03, -0.06]
+    named, _ = with_pairs_named([name[:4] for name in PAIRED], markers, HANSEN)
+    assert named[:2] == ("LKNE", "LKNE") and named[2:4] == ("RKNEL", "RKNEM")
+
+
+NUMBERED = ("LKNE1", "LKNE2", "RKNE1", "RKNE2", "LASIS", "RASIS")
+
+
+def _placed(markers: np.ndarray) -> tuple[dict[str, str], list]:
+    marker_set, said = with_numbers_placed(NUMBERED, markers, told_from(NUMBERED).marker_set)
+    return {marker.label: marker.landmark for marker in marker_set.markers}, said
+
+
+def test_places_tell_numbered_ones():
+    outer_first, nothing = _placed(_standing())
+    assert outer_first["LKNE1"] == "knee_lateral_l" and outer_first["RKNE2"] == "knee_medial_r"
+    inner_first, (said,) = _placed(_standing()[:, [1, 0, 3, 2, 4, 5]])
+    assert inner_first["LKNE2"] == "knee_lateral_l" and inner_first["RKNE1"] == "knee_medial_r"
+    assert nothing == [] and "the outer ones for LKNE2, RKNE2" in said.action
+
+
+def test_numbered_ones_that_are_no_pair_are_no_landmarks():
+    markers = _standing()
+    markers[:, 1] += [0.15, 0.03, -0.06]
+    markers[::2, [2, 3]] = markers[::2, [3, 2]]
+    found, said = _placed(markers)
+    assert "LKNE1" not in found and "LKNE2" not in found
+    assert found["RKNE1"] == found["RKNE2"] == ""
+    assert [one.subject for one in said] == ["LKNE1, LKNE2", "RKNE1, RKNE2"]

@@ -245,6 +245,20 @@ def test_three_of_a_stem_are_a_cluster_and_only_track(stem):
     assert len(found) == 3 and {meaning.landmark for meaning in found.values()} == {""}
 
 
+def test_a_word_is_not_understood_by_its_letters():
+    labels = [f"{word}_{side}" for word in ("bark", "palec", "armbage") for side in "LPVH"]
+    assert meanings(["C7", *labels]).keys() == {"C7"}
+
+
+@pytest.mark.parametrize("sides", ["GD", "ID", "SD", "ED"])
+def test_english_words_with_the_sides_of_another_language(sides):
+    left, right = sides
+    words = ("ASI", "PSI", "KNE", "ANK", "HEE", "THI")
+    found = meanings([f"{s}{word}" for s in sides for word in words])
+    assert found[f"{left}THI"].segment == "thigh_l" and found[f"{right}THI"].segment == "thigh_r"
+    assert found[f"{right}KNE"].landmark == "knee_lateral_r"
+
+
 def test_drawn_frames_are_no_markers():
     found = meanings(["LHEE", "LHDF0", "LHDF1", "LHDF2", "LHDF3", "LFHD"])
     assert set(found) == {"LHEE", "LFHD"}
@@ -253,3 +267,13 @@ def test_drawn_frames_are_no_markers():
 def test_absurd_labels_take_no_time_and_no_memory():
     labels = [f"{'lamtrk' * 500}{k}" for k in range(200)] + ["9" * 6000, "²³", "\x00", "L" * 59]
     assert meanings(labels) == {}
+
+
+def test_numbered_labels_of_one_stem_sit_on_one_segment():
+    markers = load_marker_set("opencap_subject4").markers
+    labels = [f"{m.label}_study" for m in markers if m.segment != "hand_l"]
+    guess = guess_marker_set([*labels, "r_sh1_study", "L_sh1_study", "RHJC_study", "Wand7Q_study"])
+    segments = {marker.label: marker.segment for marker in guess.marker_set.markers}
+    assert segments["r_sh1"] == "shank_r" and segments["L_sh1"] == "shank_l"
+    (said,) = guess.findings()
+    assert said.action.endswith("not understood: Wand7Q; no markers on the body: RHJC")

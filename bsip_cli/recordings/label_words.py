@@ -22,9 +22,8 @@ _MOST_WORDS, _LONGEST = 7, 60  # of a label that is understood: words, character
 _SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
 _ACROSS = 0.5  # cost of a word that reaches across a separator,
 _LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
-_LETTERS = (
-    3  # of a part that stand for a word each, the side among them; less one beside longer words
-)
+# Of a part that stand for a word each, the side among them; less one beside longer words.
+_LETTERS = 3
 _ALONE = 1.0  # cost of a side whose other side no label has
 _SPECIAL = 0.98  # of the worth of a language that extends another: it must say more
 _NUMBER_LEFT, _TRACKS = 0.1, 0.2  # cost of a meaning that leaves a number aside, or is no bone

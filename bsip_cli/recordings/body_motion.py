@@ -19,6 +19,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.momentum_mass import NEIGHBOUR, shares_of_seen
+from bsip_cli.recordings.trunk_motion import FALLS
 from bsip_cli.segments import without_side
 
 SMOOTH_S = 0.04
@@ -32,7 +33,6 @@ _MOST_OF_IT = 0.5  # of the body's mass
 _OFTEN = 0.9  # of the frames
 _FEWEST_FRAMES = 10
 _ROUNDS = 5  # of weights that follow the residuals
-FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
 _SAME = 1.0 - 1e-9  # correlation: of no noise
 _ALIKE = 0.15  # logarithm of force over motion: its scatter over sound recordings, see above

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs, runs, times
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plate_wrench import FrameWrench
 from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, lowest, outline
 
 NO_MASS = (
@@ -36,7 +36,6 @@ _MISMATCH_SHARE = 0.35  # of body weight, and of the force's own departure from 
 _MISMATCH_S = 0.1
 _BLINK_S = 0.06  # shorter touches without load are no touch
 _LEAST_WINDOW_S = 0.1
-_TRUNK_CUTOFF_HZ = 6.0
 _SAID = 2, 6  # of times: digits, and so many at most
 
 
@@ -295,38 +294,6 @@ def agreeing_mass(
     above = np.searchsorted(masses, masses * near, side="right")
     count = above - np.searchsorted(masses, masses / near)
     return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
-
-
-def reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:
-    """Gravity and the vertical acceleration of the markers' mean (n_frames, k, 3), low-passed,
-    (n_frames,)."""
-    height = mean_path(trunk_markers_m[..., 2])
-    if height is None:
-        return None
-    velocity = np.gradient(low_pass(height, rate_hz)) * rate_hz
-    return GRAVITY_M_S2 + np.gradient(velocity) * rate_hz
-
-
-def mean_path(height: np.ndarray) -> np.ndarray | None:
-    """Mean of one coordinate (n_frames, k) of the markers seen nearly always, gaps interpolated,
-    (n_frames,); None without such a marker."""
-    known = np.isfinite(height)
-    if not height.size or len(height) < 10:
-        return None
-    often = np.flatnonzero(known.mean(axis=0) > 0.9)
-    if not len(often):
-        return None
-    frames = np.arange(len(height))
-    filled = [np.interp(frames, frames[known[:, i]], height[known[:, i], i]) for i in often]
-    return np.mean(filled, axis=0)
-
-
-def low_pass(signal: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Zero phase, order 4."""
-    cutoff = min(_TRUNK_CUTOFF_HZ, 0.45 * rate_hz)
-    sections = butter(2, cutoff, fs=rate_hz, output="sos")
-    pad = min(len(signal) - 1, round(rate_hz))
-    return sosfiltfilt(sections, np.asarray(signal), padlen=pad)
 
 
 # --- which plate measures which foot --------------------------------------------------------------

@@ -23,9 +23,8 @@ from bsip_cli.recordings.contacts import (
     FootContacts,
     PlateLoad,
     bears_alone,
-    low_pass,
-    mean_path,
 )
+from bsip_cli.recordings.trunk_motion import low_pass, mean_path
 from bsip_cli.segments import SEGMENTS, without_side
 
 # A segment's share of the body's mass against the table: published regressions err by 10 to 25 %

@@ -402,9 +402,9 @@ def _pushing(source: PlateSource) -> np.ndarray:
 
 def _own_and_sum(
     trials: Sequence[Mapping[str, np.ndarray]], name: str, terms: Sequence[str]
-) -> tuple[np.ndarray, float, int]:
+) -> tuple[np.ndarray, float]:
     """A plate's wrench and the sum of others', (2, n, 6), where some bear load in the trials that
-    have them all; from which force [N] on they do; how many others."""
+    have them all; from which force [N] on they do."""
     common = [trial for trial in trials if name in trial and all(t in trial for t in terms)]
     own = [np.concatenate([t[n] for t in common] or [np.zeros((0, 6))]) for n in (name, *terms)]
     wrenches = np.stack(own)
@@ -413,7 +413,7 @@ def _own_and_sum(
     # Plates that bear nothing are alike; a few samples may be damaged on one of them.
     least = _BEARS * forces.max(initial=0.0)
     wrenches = wrenches[:, forces.max(axis=0) > least]
-    return np.stack([wrenches[0], wrenches[1:].sum(axis=0)]), least, len(terms)
+    return np.stack([wrenches[0], wrenches[1:].sum(axis=0)]), least
 
 
 def _gap(both: np.ndarray, least_N: float) -> np.ndarray:
@@ -422,11 +422,12 @@ def _gap(both: np.ndarray, least_N: float) -> np.ndarray:
     return np.asarray(np.abs(own_N - sum_N) / own_N.clip(min=least_N))
 
 
-def _is_as_large(both: np.ndarray, least_N: float, _terms: int) -> bool:
+def _is_as_large(both: np.ndarray, least_N: float) -> bool:
     return bool(both.any() and np.mean(_gap(both, least_N) < _SAME) > _MOSTLY)
 
 
-def _is_at_place(both: np.ndarray, least_N: float, terms: int, floor_m: float) -> bool:
+def _is_at_place(both: np.ndarray, least_N: float, floor_m: float) -> bool:
+    """And nearly as large: plates whose corners are stated as the same have loads of their own."""
     bears = (both[..., 2] > least_N).all(axis=0)
     if not bears.any():
         return False
@@ -434,5 +435,4 @@ def _is_at_place(both: np.ndarray, least_N: float, terms: int, floor_m: float) -
     low, high = np.percentile(one[bears], (16, 84), axis=0)
     near_m = min(_SAME_PLACE_M, 0.5 * float(np.hypot(*(high - low))))
     there = bears & (np.hypot(*(one - other).T) < near_m)
-    # Between two feet a third one may be, but none that bears as much as both.
-    return bool(np.mean(there & ((terms == 1) | (_gap(both, least_N) < _NEARLY))) > _MEETS)
+    return bool(np.mean(there & (_gap(both, least_N) < _NEARLY)) > _MEETS)

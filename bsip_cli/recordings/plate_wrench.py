@@ -12,6 +12,7 @@ from scipy.signal import upfirdn
 from bsip_cli.recordings.analog import long_runs, runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.trunk_motion import in_flight
 
 _NOTICED_N = 1.0
 _WINDOW_S = 0.2
@@ -39,8 +40,14 @@ class PlateZero:
         return self.n_samples > 0
 
 
-def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = None) -> PlateZero:
-    """Find unloaded intervals: long, low and quiet in the vertical force, as an instrument reads.
+def plate_zero(
+    plate: Plate,
+    rate_hz: float,
+    surely_free: np.ndarray | None = None,
+    flight: np.ndarray | None = None,
+) -> PlateZero:
+    """Find unloaded intervals: long, low and quiet in the vertical force, as an instrument reads;
+    without one, those of ``flight`` (n_analog,) bool.
 
     The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near, or the
     plate reads a steady pull: it was set to zero under the person.
@@ -58,6 +65,8 @@ def plate_zero(plate: Plate, rate_hz: float, surely_free: np.ndarray | None = No
         if abs(level) >= _LARGEST_N:  # it counts wherever the plate reads it while nobody is near
             unloaded = free & (np.abs(mean - level) < _LARGEST_N)
     unloaded = long_runs(unloaded, max(2, round(_LEAST_S * rate_hz)))
+    if not unloaded.any() and flight is not None:
+        unloaded = _quiet_in(plate, flight & heard, rate_hz)
     if not unloaded.any():
         return PlateZero(np.zeros(6), 0, ())
     return _zero_of(plate, unloaded, rate_hz)
@@ -71,7 +80,8 @@ def without_zeros(
     done, zeros = [], {}
     for plate in recording.plates:
         free = nobody_near(recording, plate)
-        zero = plate_zero(plate, recording.analog_rate_hz, surely_free=free)
+        flight = in_flight(recording, len(plate.usable))
+        zero = plate_zero(plate, recording.analog_rate_hz, free, flight)
         done.append(subtract_zero(plate, zero))
         if zero.is_known():
             zeros[plate.name] = zero.offset.tolist()
@@ -98,6 +108,14 @@ def steady_pull(plate: Plate, rate_hz: float) -> np.ndarray:
     lowest = min(np.percentile(mean, 1), -_LARGEST_N)
     pulls = plate.usable & (spread < _QUIET_N) & (mean < lowest + _QUIET_N)
     return long_runs(pulls, max(2, round(_PULLED_S * rate_hz)))
+
+
+def _quiet_in(plate: Plate, flight: np.ndarray, rate_hz: float) -> np.ndarray:
+    """The flight in which a plate reads the same throughout, (n_analog,) bool."""
+    if not flight.any():
+        return flight
+    lift = uniform_filter1d(plate.force_N[:, 2], max(1, round(_WINDOW_S / 4 * rate_hz)))[flight]
+    return flight & bool(np.ptp(np.percentile(lift, [5, 95])) < _QUIET_N)
 
 
 def _zero_of(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> PlateZero:

@@ -17,7 +17,7 @@ from scipy.signal import find_peaks
 from scipy.special import logsumexp
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.body_motion import FALLS, SMOOTH_S, USUAL, Balance, Body, GateLimits
+from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, GateLimits
 from bsip_cli.recordings.one_person import Sizes, sizes_of
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
@@ -31,6 +31,7 @@ from bsip_cli.recordings.plate_reading import (
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
 from bsip_cli.recordings.shared_forces import Course
+from bsip_cli.recordings.trunk_motion import FALLS
 from bsip_cli.recordings.under_the_feet import Feet
 from bsip_cli.recordings.written import OTHER_RATE, PACES, Lengths
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_wrench import (
@@ -23,6 +24,7 @@ from bsip_cli.recordings.plate_wrench import (
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate
 from bsip_cli.recordings.read import lost_zeros, read_recording, sign_doubts
+from bsip_cli.recordings.trunk_motion import in_flight
 from tests.recordings import standing_on_two_plates as trials
 from tests.recordings.recording_writers import (
     CORNERS_M,
@@ -71,7 +73,7 @@ def test_any_number_of_plates_overlapping_or_not(tmp_path, n_plates):
     force[:, :2] = 0.0  # which would lean away from the body under one foot or the other
     moment = np.cross(_swaying([0.2, 0.3, 0.0]), force)
     t = np.linspace(0, 9, N * RATIO)[:, None]
-    shares = np.array([1.5 + np.sin(t + k * k) for k in range(n_plates)])
+    shares = np.array([1.5 + np.sin((1 + 0.3 * k) * t) for k in range(n_plates)])
     shares = shares / shares.sum(axis=0) if n_plates else shares
     specs = [
         PlateSpec(share * force, share * moment, corners_m=CORNERS_M + np.array([x, 0, 0]))
@@ -199,6 +201,27 @@ def test_a_large_zero_counts_where_nobody_is_near():
     assert zero.offset[2] == pytest.approx(300.0)
     under = _plate(np.full(4000, 300.0))
     assert not nobody_near(recording, under).any()
+
+
+@pytest.mark.parametrize("ring_N", [0.0, 40.0])
+def test_a_plate_that_is_unloaded_only_in_flight_gets_its_zero_there(ring_N):
+    """A jump of 0.5 s; one whose plate still rings tells nothing, nor does a fall of 0.1 s."""
+    markers, labels = standing_markers(200)
+    for seconds in (0.5, 0.1):
+        n = round(100 * seconds)
+        t_s = np.arange(n) / 100.0
+        jump = markers.copy()
+        jump[80 : 80 + n, :, 2] += (0.5 * GRAVITY_M_S2 * t_s * (seconds - t_s))[:, None]
+        load = np.full(2000, 700.0)
+        load[800 : 800 + 10 * n] = 60.0 + ring_N * np.sin(np.arange(10 * n) / 30.0)
+        plate = _plate(load)
+        recording = Recording(
+            None, 100.0, tuple(labels), jump, RATE_HZ, (plate,), (), np.eye(3), "", 0.0
+        )
+        zero = plate_zero(plate, RATE_HZ, flight=in_flight(recording, len(load)))
+        assert zero.is_known() == (seconds == 0.5 and ring_N == 0.0)
+        assert zero.offset[2] == pytest.approx(60.0 * zero.is_known())
+    assert not plate_zero(plate, RATE_HZ).is_known()
 
 
 OFFSET = np.array([3.0, -2.0, 12.0, 0.5, -0.4, 0.1])

@@ -187,7 +187,7 @@ class _Voice:
 
     verbose: bool
     quiet: bool
-    said: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    said: dict[tuple[str, str], dict[str, list[str]]] = field(default_factory=dict)
     kept_from: dict[str, list[str]] = field(default_factory=dict)  # by person
 
     def report(self, outcome: Outcome) -> None:
@@ -198,12 +198,15 @@ class _Voice:
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
             general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
-            general = re.sub(_TIMES, "at times", general)
-            alike = self.said.setdefault((outcome.stage, general), [])
-            if is_finding or not alike:
+            if outcome.stage == "ingest":  # whose quality table has the times
+                general = re.sub(_TIMES, "at times", general)
+            alike = self.said.setdefault((outcome.stage, general), {})
+            whose = match.group() if (match := re.search(_NAME, sentence)) else outcome.unit
+            is_of_the_first = next(iter(alike), whose) == whose
+            if is_finding or (is_of_the_first and sentence not in alike.get(whose, ())):
                 _say(outcome, sentence)
-            whose = re.search(_NAME, sentence)
-            alike += [] if is_finding else [whose.group() if whose else outcome.unit]
+            if not is_finding:
+                alike.setdefault(whose, []).append(sentence)
         if self.verbose and outcome.state == "done":
             what = f"{outcome.seconds:.1f} s; read {', '.join(outcome.reads)}"
             _say(outcome, f"{outcome.unit}: {what}")
@@ -211,7 +214,7 @@ class _Voice:
     def report_the_others(self) -> None:
         for (stage, sentence), units in self.said.items():
             if len(units) > 1:
-                others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
+                others = f"the same of {listed([*units][1:])}: {sentence.removeprefix('it: ')}"
                 tqdm.write(f"{stage}: {others}", file=sys.stderr)
         kept: dict[str, list[str]] = {}
         for name, stages in self.kept_from.items():

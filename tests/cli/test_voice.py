@@ -4,6 +4,8 @@ import re
 import time
 from io import StringIO
 
+import pytest
+
 from bsip_cli.running.runner import Outcome
 from bsip_cli.running.session import follow
 
@@ -48,6 +50,20 @@ def test_a_remark_at_other_times_is_the_same(capsys):
     text = told(capsys, outcomes)
     assert f"ingest: sub-1: left foot: beside: {when[0]}; left out" in text
     assert "ingest: the same of sub-2, sub-3: left foot: beside: at times; left out" in text
+
+
+@pytest.mark.parametrize("stage", ["ingest", "export"])
+def test_what_is_there_twice_in_one_recording_is_said_twice(capsys, stage):
+    when = ("0.17 to 0.68 s", "1.90 to 2.42 s")
+    sentences = tuple(f"sub-1: labels exchanged: {one}" for one in when)
+    others = tuple(
+        f"sub-2: labels exchanged: {one}" for one in ("0.20 to 0.30 s", "0.50 to 0.60 s")
+    )
+    outcomes = [Outcome(stage, "sub-1", "done", sentences), Outcome(stage, "sub-2", "done", others)]
+    assert follow("run", [], (one for one in outcomes), 2, None) == 0
+    text = capsys.readouterr().err
+    assert all(f"{stage}: {one}" in text for one in sentences)
+    assert all((one in text) == (stage == "export") for one in others)
 
 
 def test_of_files_it_is_said_what_they_end_with(capsys):

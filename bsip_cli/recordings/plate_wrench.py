@@ -78,9 +78,10 @@ def without_zeros(
     """The plates without what they read without load, and that, (6,) by plate: N and N m about the
     world's origin."""
     done, zeros = [], {}
+    if recording.plates:
+        flight = in_flight(recording, len(recording.plates[0].usable))
     for plate in recording.plates:
         free = nobody_near(recording, plate)
-        flight = in_flight(recording, len(plate.usable))
         zero = plate_zero(plate, recording.analog_rate_hz, free, flight)
         done.append(subtract_zero(plate, zero))
         if zero.is_known():

@@ -23,10 +23,9 @@ from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import by_segment, crossed_limbs, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
-from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
+from bsip_cli.recordings.trunk_motion import low_pass, trunk_reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import Written, force_unit_words
-from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
 _LIGHTLY_LOADED_N = 20.0
@@ -449,12 +448,9 @@ def lost_zeros(plates: Sequence[Plate], reversed_names: list[str], recording: Re
     Then a plate that somebody leaves reads a pull, as one does whose sign is the other one; but
     reversed, all plates together go less with the motion of the trunk than as recorded.
     """
-    segments = by_segment(recording.labels, recording.markers_m)
-    trunk = [segments[name] for name in TRUNK if name in segments]
-    if not trunk or not 0 < len(reversed_names) < len(plates):
+    if not 0 < len(reversed_names) < len(plates):
         return ""
-    reach = reach_m_s2(np.concatenate(trunk, axis=1), recording.marker_rate_hz)
-    if reach is None:
+    if (reach := trunk_reach_m_s2(recording)) is None:
         return ""
     frames = np.arange(recording.n_frames) / recording.marker_rate_hz
     times = np.arange(len(plates[0].usable)) / recording.analog_rate_hz

@@ -459,7 +459,10 @@ def crossed_limbs(labels: Sequence[str], markers_m: np.ndarray) -> list[str]:
             continue
         upper_l, upper_r, lower_l, lower_r = places.swapaxes(0, 1)
         own, other = (
-            max(float(np.ptp(np.percentile(_apart(a, b), [20, 80]))) for a, b in pairs)
+            max(
+                float(np.ptp(np.percentile(np.linalg.norm(a - b, axis=-1), [20, 80])))
+                for a, b in pairs
+            )
             for pairs in (
                 ((upper_l, lower_l), (upper_r, lower_r)),
                 ((upper_l, lower_r), (upper_r, lower_l)),
@@ -468,10 +471,6 @@ def crossed_limbs(labels: Sequence[str], markers_m: np.ndarray) -> list[str]:
         if own > max(_CHANGES_M, _TIMES * other):
             found.append(limb)
     return found
-
-
-def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.linalg.norm(a - b, axis=-1))
 
 
 def _landmarks(labels: Sequence[str]) -> dict[str, int]:

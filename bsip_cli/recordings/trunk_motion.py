@@ -22,17 +22,21 @@ _FLIGHT_S, _ENDS_S = 0.2, 0.1
 def in_flight(recording: Recording, n: int) -> np.ndarray:
     """Analog samples in which the trunk surely falls freely, (n,) bool: whole flights but for their
     ends; none without markers on it."""
-    segments = by_segment(recording.labels, recording.markers_m)
-    trunk = [segments[name] for name in TRUNK if name in segments]
     rate_hz = recording.marker_rate_hz
-    reach = reach_m_s2(np.concatenate(trunk, axis=1), rate_hz) if trunk else None
-    if reach is None:
+    if (reach := trunk_reach_m_s2(recording)) is None:
         return np.zeros(n, bool)
     flight = long_runs(reach < FALLS * GRAVITY_M_S2, round((_FLIGHT_S + _ENDS_S) * rate_hz))
     width = 2 * round(_ENDS_S * rate_hz) + 1
     sure = np.convolve(~flight, np.ones(width), mode="same") <= 0
     frames = np.rint(np.arange(n) * rate_hz / recording.analog_rate_hz).astype(int)
     return sure[frames.clip(0, len(sure) - 1)] & (frames < len(sure))
+
+
+def trunk_reach_m_s2(recording: Recording) -> np.ndarray | None:
+    """`reach_m_s2` of the markers that the labels put on the trunk; None without any."""
+    segments = by_segment(recording.labels, recording.markers_m)
+    trunk = [segments[name] for name in TRUNK if name in segments]
+    return reach_m_s2(np.concatenate(trunk, axis=1), recording.marker_rate_hz) if trunk else None
 
 
 def reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:

@@ -1,6 +1,7 @@
 # make sample   set up, run the whole pipeline on sample_data, print the tables
 # make test     set up, check the code's form, run the tests of every part and a small run (minutes)
 # make test-long   the other tests: whole runs, the short blind suite, real recordings, damaged files
+# make coverage   the tests of `make test`, and which lines of the package they reach, by folder
 # make blind    hide effects in recordings and see whether `bsip diagnose` finds them (hours)
 # make cohort   simulate twelve people with 120 s sequences and run them
 # make COHORT=path [OUT=path] [-j 4]   your study: so many participants at once, then the tables of
@@ -17,7 +18,7 @@ PROFILE ?= plain
 CLUSTER ?= .venv-cluster
 DOCS ?= .venv-docs
 
-.PHONY: sample test test-long blind cohort check clean study cluster locks docs
+.PHONY: sample test test-long coverage blind cohort check clean study cluster locks docs
 
 sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
@@ -33,6 +34,10 @@ test: check
 test-long: $(READY)
 	@$(MAKE) --no-print-directory $(CLUSTER)/ready || echo "Snakemake cannot be installed: its tests will skip"
 	$(PYTEST) -m long
+
+coverage: .venv/ready
+	$(PYTEST) -m "not long" --cov --cov-report=json:out/coverage.json
+	$(BIN)/python -m benchmarks.coverage out/coverage.json
 
 blind: .venv/ready
 	$(BIN)/python -m tests.blind.blind_long --jobs $(JOBS) --draws $(DRAWS)

@@ -1,6 +1,6 @@
 """bsip: body segment inertial parameters from motion capture and force plates."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LIBRARY = ("Person", "Plate", "read", "recording")
 __all__ = ["__version__", *_LIBRARY]

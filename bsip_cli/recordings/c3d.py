@@ -45,6 +45,7 @@ _SAME_PLACE_M = 1e-3  # as precise as corners are written
 # Of the longest side: over 160 plates of the public recordings corners miss a rectangle's by 0.7 %.
 _PARALLEL = 0.02
 _PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, that can be distinguished
+_AXIS = re.compile(r"([FMTP])\d*([XYZ])")  # of a channel's label, in capitals: FX1, F1X, Force.Fx1
 _FIRST_YEAR = 1987  # of the format
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
@@ -214,12 +215,14 @@ def read_plates(
 
     ``length_unit_m`` is the size of the unit of points, corners and origins.
     """
-    plates, findings, about_samples = [], [], []
+    plates, about_samples = [], []
     group = content.group("FORCE_PLATFORM")
     stated = _stated_plates(group)
+    table, findings = _channel_table(content)
     for index in range(_n_plates(group)):
         try:
-            plate, about, faulty = _read_plate(content, length_unit_m, index, rotation_world_lab)
+            where = length_unit_m, index, rotation_world_lab
+            plate, about, faulty = _read_plate(content, table, *where)
         except _UnusablePlateError as why:
             if 0 < stated <= index:  # not used, as the file says
                 continue
@@ -272,7 +275,11 @@ def _stated_plates(group: Group) -> int:
 
 
 def _read_plate(
-    content: Content, length_unit_m: float, index: int, rotation_world_lab: np.ndarray
+    content: Content,
+    table: np.ndarray,
+    length_unit_m: float,
+    index: int,
+    rotation_world_lab: np.ndarray,
 ) -> tuple[C3dPlate, list[Finding], list[Finding]]:
     group, name = content.group("FORCE_PLATFORM"), str(index + 1)
     kind = _kind(group, index)
@@ -285,7 +292,7 @@ def _read_plate(
     if kind == 3 and not origin[:2].all():
         found = "a type 3 plate whose ORIGIN lacks the distances of the sensors"
         raise _UnusablePlateError(found, "the half distances a and b of the sensors")
-    rows = _channel_rows(group, kind, index, len(content.analog))
+    rows = _channel_rows(table, kind, index, content, _n_plates(group))
     raw, scales = content.analog[rows].T, content.analog_scales[rows]
     _check_apart(kind, rows, raw)
     if not np.isfinite(scales).all() or not scales.any():  # one of size zero does not answer
@@ -391,18 +398,74 @@ def _sides(corners_m: np.ndarray) -> str:
     return "sides of " + ", ".join(f"{side:.3g}" for side in side_lengths(corners_m)) + " m"
 
 
-def _channel_rows(group: Group, kind: int, index: int, n_analog: int) -> np.ndarray:
-    table, wanted = np.atleast_1d(whole_numbers(group, "CHANNEL")), len(CHANNELS_OF[kind])
+def _channel_table(content: Content) -> tuple[np.ndarray, list[Finding]]:
+    """FORCE_PLATFORM:CHANNEL, (channels, plates). Where the labels of the channels contradict it as
+    the format wants it, and agree with one other way to write it, that one counts."""
+    group = content.group("FORCE_PLATFORM")
+    table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
     table = table[:, None] if table.ndim == 1 else table
-    if table.ndim != 2 or table.shape[0] < wanted or table.shape[1] <= index:
+    if table.ndim != 2:
+        return np.zeros((0, 0), int), []
+    orders = {
+        "": table,
+        "stored by rows": np.ravel(table, order="F").reshape(table.shape),
+        "with a row for each plate": table.T,
+    }
+    axes = [
+        "".join((_AXIS.findall(label.upper()) or [""])[-1])
+        for label in texts(content.group("ANALOG"), "LABELS")[: len(content.analog)]
+    ]
+    kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
+    fitting: dict[bytes, tuple[str, np.ndarray]] = {}
+    for order, one in orders.items():
+        for first, counted in ((1, one), (0, one + 1)):
+            if _fits_labels(counted, kinds, axes):
+                words = [order, "" if first else "counted from 0"]
+                known = " and ".join(filter(None, words)), counted
+                fitting.setdefault(counted.astype(int).tobytes(), known)
+    if len(fitting) != 1 or not (words := next(iter(fitting.values()))[0]):
+        return table, []
+    found = f"by the labels of its channels FORCE_PLATFORM:CHANNEL is {words}"
+    expected = "counted from 1, a column for each plate"
+    about = Finding("plate", "", found, expected, "read it so", "corrected")
+    return next(iter(fitting.values()))[1], [about]
+
+
+def _fits_labels(table: np.ndarray, kinds: Sequence[int], axes: Sequence[str]) -> bool:
+    """Whether the channels of all plates measure by their labels what the plates' types want."""
+    for index, kind in enumerate(kinds):
+        wanted = [name[:2].upper().replace("T", "M") for name in CHANNELS_OF.get(kind, ())]
+        if not wanted or len(table) < len(wanted) or table.shape[1] <= index:
+            return False
+        rows = table[: len(wanted), index] - 1
+        if rows.min() < 0 or rows.max() >= len(axes):
+            return False
+        if [axes[row].replace("T", "M") for row in rows] != wanted:
+            return False
+    return bool(kinds)
+
+
+def _channel_rows(
+    table: np.ndarray, kind: int, index: int, content: Content, n_plates: int
+) -> np.ndarray:
+    wanted, n_analog = len(CHANNELS_OF[kind]), len(content.analog)
+    if table.shape[0] < wanted or table.shape[1] <= index:
         found = f"{table.shape[0]} channels listed for it"
-        raise _UnusablePlateError(found, f"{wanted} channels of a type {kind} plate")
+        expected = f"{wanted} channels of a type {kind} plate"
+        if table.shape[1] >= wanted:
+            found = f"FORCE_PLATFORM:CHANNEL has {table.shape[0]} rows"
+            expected += ", a column for each plate"
+        raise _UnusablePlateError(found, expected)
     rows = table[:wanted, index] - 1
     if rows.min() < 0 or rows.max() >= n_analog:
         claimed = rows.max() + 1 if rows.max() >= n_analog else 0
         found = f"it claims analog channel {claimed}"
-        raise _UnusablePlateError(found, f"one of the file's {n_analog}")
-    for other in set(range(min(_n_plates(group), table.shape[1]))) - {index}:
+        expected = f"one of the file's {n_analog}"
+        if not claimed:
+            found += " in FORCE_PLATFORM:CHANNEL"
+            expected += ", counted from 1"
+        raise _UnusablePlateError(found, expected)
+    for other in set(range(min(n_plates, table.shape[1]))) - {index}:
         shared = np.isin(rows, table[:, other] - 1)
         if shared.any() and not shared.all():  # all: a copy
             found = f"analog channel {rows[shared][0] + 1} is also listed for plate {other + 1}"

@@ -98,9 +98,9 @@ def read_content(path: Path) -> Content:
     reach = (header.data_start_block - 1) * BLOCK if header.data_start_block > 2 else None
     records = read_records(path, raw[:reach])
     stated = parameters_of(records, header.processor)
-    layout, findings = decided_layout(path, header, stated, len(raw))
+    layout, findings = decided_layout(path, header, stated, raw)
     rate_hz, about_rate = decided_rate(path, header, stated, layout)
-    point_scale, about_scale = decided_scale(header, stated)
+    point_scale, about_scale = decided_scale(header, stated, layout.is_float)
     about_scale += about_scales(stated.get("ANALOG", {}), layout.n_channels)
     scaling = scaling_of(stated.get("ANALOG", {}), layout.n_channels, says_unsigned(records))
     if needs_mending(header, records, layout, rate_hz):
@@ -300,7 +300,7 @@ def needs_mending(
         and (header.data_start_block - 1) * BLOCK == layout.start
         and number(point, "USED") == layout.n_points
         and abs(number(point, "RATE") - rate_hz) < 1e-9
-        and (number(point, "SCALE") < 0) == layout.is_float
+        and (number(point, "SCALE") < 0) == (header.scale < 0) == layout.is_float
     )
 
 

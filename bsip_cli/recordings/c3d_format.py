@@ -238,6 +238,7 @@ def parameters_of(records: Sequence[Record], processor: int) -> Parameters:
 
 
 _SAME = 1e-3
+_TINY, _HUGE, _MOSTLY = 1e-9, 1e9, 0.99  # of floats in any unit; of pairs of integers few are so
 _WORD = 0x10000
 
 
@@ -285,18 +286,26 @@ class Layout:
 
 
 def decided_layout(
-    path: Path, header: Header, parameters: Parameters, file_size: int
+    path: Path, header: Header, parameters: Parameters, content: bytes
 ) -> tuple[Layout, list[Finding]]:
     """The layout of the data, and a finding where header and parameters disagree.
 
     A layout that wants more bytes than the file holds is out (a last partial block is
     forgiven); one that ends with the file goes first. Where the file's length does not decide,
-    it is refused: ezc3d takes the parameters' word, and was wrong in 3 of 5 real files.
+    it is refused: ezc3d takes the parameters' word, and was wrong in 3 of 5 real files. Where the
+    sign of the scales is not that of what is written, numbers and length decide together.
     """
+    file_size = len(content)
     stated = _by_header(header, parameters, file_size)
     other = _by_parameters(stated, parameters)
     if stated.n_frames < 1 or stated.words_per_frame < 1 or stated.start < BLOCK:
         stated = other
+    if not (stated.ends_with(file_size) or other.ends_with(file_size)):
+        for one in (stated, other):
+            read = replace(one, is_float=not one.is_float)
+            are_floats = read.fits(file_size) and _are_floats(content[read.start :], header)
+            if read.ends_with(file_size) and read.n_frames > 0 and are_floats == read.is_float:
+                return read, [_about_kind(read, header, parameters)]
     both = f"the header counts {stated.describe()}, the parameters {other.describe()}"
     fitting = [layout for layout in dict.fromkeys((stated, other)) if layout.fits(file_size)]
     fitting = [layout for layout in fitting if layout.ends_with(file_size)] or fitting
@@ -319,6 +328,21 @@ def decided_layout(
         expected = f"none, or as many as fill the last {BLOCK} bytes"
         said.append((found, expected, "read the data where the header says"))
     return chosen, [Finding("layout", "", *words, "warning") for words in said]
+
+
+def _are_floats(data: bytes, header: Header) -> bool:
+    """Whether coordinates and samples can be 32-bit floats: two integers hardly make such sizes."""
+    sizes = np.abs(floats(data[: len(data) // 4 * 4], header.processor))
+    with np.errstate(invalid="ignore"):
+        return bool(((sizes == 0) | ((sizes > _TINY) & (sizes < _HUGE))).mean() > _MOSTLY)
+
+
+def _about_kind(read: Layout, header: Header, parameters: Parameters) -> Finding:
+    stated = number(parameters.get("POINT", {}), "SCALE")
+    found = f"POINT:SCALE is {stated:g}, the header's scale {header.scale:g}, and the data are "
+    kind = "floats" if read.is_float else "integers"
+    expected = f"{'negative' if read.is_float else 'positive'} scales of {kind}"
+    return Finding("scale", "points", found + kind, expected, f"read {kind}", "corrected")
 
 
 def _too_large(path: Path, stated: Layout, file_size: int) -> BadDataError:
@@ -396,18 +420,26 @@ def _count(group: Group, name: str) -> int | None:
 def decided_rate(
     path: Path, header: Header, parameters: Parameters, layout: Layout
 ) -> tuple[float, list[Finding]]:
-    """Frames per second, and findings where the file's statements of rates differ."""
+    """Frames per second, and findings where the file's statements of rates differ: the header's
+    where ANALOG:RATE or TRIAL:CAMERA_RATE agree with it and with POINT:RATE neither does."""
     stated = number(parameters.get("POINT", {}), "RATE")
     usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < MOST_HZ]
     if not usable:
         found, remedy = f"POINT:RATE is {stated:g} Hz", "export the trial with its rate"
         raise refusal(path, found, "a rate above 0 Hz", remedy)
     rate_hz, findings = usable[0], []
-    if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
-        found = f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz"
-        action = f"read {rate_hz:g} Hz"
-        findings.append(Finding("rate", "points", found, "one rate", action, "warning"))
     analog_hz = number(parameters.get("ANALOG", {}), "RATE")
+    if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
+        cameras_hz = number(parameters.get("TRIAL", {}), "CAMERA_RATE")
+        others_hz = np.array([analog_hz / layout.samples_per_frame, cameras_hz])
+        agrees = [bool((np.abs(others_hz / one - 1) <= _SAME).any()) for one in usable]
+        found = f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz"
+        level = "warning"
+        if agrees == [False, True]:
+            rate_hz, level = usable[1], "corrected"
+            found += ", with which ANALOG:RATE or TRIAL:CAMERA_RATE agrees"
+        action = f"read {rate_hz:g} Hz"
+        findings.append(Finding("rate", "points", found, "one rate", action, level))
     real_hz = rate_hz * layout.samples_per_frame
     if layout.n_channels and not abs(analog_hz / real_hz - 1) <= _SAME:
         found = (
@@ -419,15 +451,17 @@ def decided_rate(
     return rate_hz, findings
 
 
-def decided_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
+def decided_scale(
+    header: Header, parameters: Parameters, is_float: bool
+) -> tuple[float, list[Finding]]:
     """Size of one count of the coordinates, negative where they are floats, as ezc3d wants it."""
     stated = number(parameters.get("POINT", {}), "SCALE")
     if not np.isfinite(stated) or stated == 0:
         stated = header.scale if np.isfinite(header.scale) and header.scale else 1.0
     size = abs(stated)
-    if header.scale < 0:
+    if is_float:
         return -size, []
-    if abs(size - header.scale) <= _SAME * size:
+    if abs(size - abs(header.scale)) <= _SAME * size:
         return size, []
     found = f"POINT:SCALE is {stated:g}, the header says {header.scale:g}"
     return size, [Finding("scale", "points", found, "one scale", f"used {size:g}", "warning")]

@@ -103,6 +103,11 @@ class PlateReading:
         own = CHANNELS_OF[kind]
         return np.eye(len(own)) if own == CHANNELS else self.channel_matrix(own)
 
+    def in_units(self, moments: float, points: float) -> PlateReading:
+        """With numbers of another size, of the same sign."""
+        sign = -1.0 if self.moment_scale < 0 else 1.0
+        return replace(self, moment_scale=sign * moments, point_scale=points)
+
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
         done = [

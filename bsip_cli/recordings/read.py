@@ -103,6 +103,8 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []
+    units = _own_units(session, recording.path.stem)
+    findings += _about_own_units(units)
     by_name = {source.name: source for source in opened.sources}
     for source in opened.sources:
         verdict = session.plates.get(source.name, _UNLOADED)
@@ -117,14 +119,15 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
                 missing.append(source)
                 continue
             source = source.in_place_of(by_name[other])
-        plate = source.plate(verdict.reading)
+        reading = verdict.reading.in_units(*units) if units else verdict.reading
+        plate = source.plate(reading)
         if fault := _no_person(plate, recording.analog_rate_hz):
             findings.append(fault)
             missing.append(source)
             continue
-        findings += source.findings(verdict.reading)
+        findings += source.findings(reading)
         plates.append(plate)
-        if verdict.reading.sign < 0:
+        if reading.sign < 0:
             findings.append(_reversed(plate))
             reversed_names.append(plate.name)
     plates, about = _without_missing(plates, missing)
@@ -138,6 +141,22 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         findings=(*recording.findings, *findings),
         forces_note=note,
     )
+
+
+def _own_units(session: SessionReading, trial: str) -> tuple[float, float] | None:
+    """Of moments and points, where they are not those of the session's other trials."""
+    if trial not in session.moment_scales:
+        return None
+    return session.moment_scales[trial], session.point_scales[trial]
+
+
+def _about_own_units(units: tuple[float, float] | None) -> list[Finding]:
+    if units is None:
+        return []
+    found = "the moments or points of force are not in the unit of the session's other trials"
+    words = AS_STATED.in_units(*units).words() or "took them as they stand"
+    action, expected = f"{words}, in this trial alone; export all in one unit", "one unit"
+    return [Finding("unit", "forces", found, expected, action, "corrected")]
 
 
 def _without_missing(

@@ -103,11 +103,11 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []
-    units = _own_units(session, recording.path.stem)
-    findings += _about_own_units(units)
+    findings += _about_own_units(session.units_of(recording.path.stem))
+    verdicts = session.plates_of(recording.path.stem)
     by_name = {source.name: source for source in opened.sources}
     for source in opened.sources:
-        verdict = session.plates.get(source.name, _UNLOADED)
+        verdict = verdicts.get(source.name, _UNLOADED)
         if verdict.repeats:
             continue
         if verdict.refusal:
@@ -119,15 +119,14 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
                 missing.append(source)
                 continue
             source = source.in_place_of(by_name[other])
-        reading = verdict.reading.in_units(*units) if units else verdict.reading
-        plate = source.plate(reading)
+        plate = source.plate(verdict.reading)
         if fault := _no_person(plate, recording.analog_rate_hz):
             findings.append(fault)
             missing.append(source)
             continue
-        findings += source.findings(reading)
+        findings += source.findings(verdict.reading)
         plates.append(plate)
-        if reading.sign < 0:
+        if verdict.reading.sign < 0:
             findings.append(_reversed(plate))
             reversed_names.append(plate.name)
     plates, about = _without_missing(plates, missing)
@@ -141,13 +140,6 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         findings=(*recording.findings, *findings),
         forces_note=note,
     )
-
-
-def _own_units(session: SessionReading, trial: str) -> tuple[float, float] | None:
-    """Of moments and points, where they are not those of the session's other trials."""
-    if trial not in session.moment_scales:
-        return None
-    return session.moment_scales[trial], session.point_scales[trial]
 
 
 def _about_own_units(units: tuple[float, float] | None) -> list[Finding]:

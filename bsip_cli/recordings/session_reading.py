@@ -120,6 +120,19 @@ class SessionReading:
         counting = [one for one in self.plates.values() if not one.repeats]
         return bool(counting) and all(one.refusal for one in counting)
 
+    def units_of(self, trial: str) -> tuple[float, float] | None:
+        """Scales of moments and points, where they are not those of the session's other trials."""
+        if trial not in self.moment_scales:
+            return None
+        return self.moment_scales[trial], self.point_scales[trial]
+
+    def plates_of(self, trial: str) -> dict[str, Verdict]:
+        """In the units of a trial."""
+        if (units := self.units_of(trial)) is None:
+            return dict(self.plates)
+        read = {name: one.reading.in_units(*units) for name, one in self.plates.items()}
+        return {name: replace(one, reading=read[name]) for name, one in self.plates.items()}
+
     def gains(self) -> dict[str, float]:
         """Of plates that read another force than the load."""
         return {name: one.gain for name, one in self.plates.items() if one.gain != 1.0}

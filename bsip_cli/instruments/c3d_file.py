@@ -182,15 +182,18 @@ def rewrite_c3d(
     except (OSError, RuntimeError, ValueError) as error:
         raise BadDataError(f"ezc3d cannot read it ({error})", file=source) from error
     wired = wired_plates(c3d, source)
-    columns = _marker_columns(c3d)
-    scale = _scale_m(c3d, source)
-    before = _instruments(c3d, columns, wired, scale)
+    markers, scale = _markers(c3d), _scale_m(c3d, source)
+    before = _instruments(c3d, markers, wired, scale)
     after = change(before)
     _cut(c3d, before, after)
     first = before.first_frame_of(after)
     kept = before.frames(first, first + len(after.points_m))
-    _put_points(c3d, columns, kept, after, scale)
-    _put_forces(c3d, wired, kept, after)
+    _put_points(c3d, np.array(list(markers), dtype=int), kept, after, scale)
+    analogs = c3d["data"]["analogs"].copy()
+    for plate, old, new in zip(wired, kept.readings, after.readings, strict=True):
+        if not np.array_equal(old, new, equal_nan=True):
+            analogs[0, plate.channels] = plate.changed(analogs[0], new - old)
+    c3d["data"]["analogs"] = analogs
     if after.marker_hz != before.marker_hz:
         for group in ("POINT", "ANALOG"):
             rate = c3d["parameters"][group]["RATE"]
@@ -214,22 +217,17 @@ def _write(c3d: Any, copy: Path, source: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _labels(c3d: Any) -> list[str]:
-    """POINT:LABELS, LABELS2 and so on, one for each point."""
+def _markers(c3d: Any) -> dict[int, str]:
+    """The labels (POINT:LABELS, LABELS2 and so on) of points that are markers, not angles or forces
+    of a model, by column."""
     point = c3d["parameters"]["POINT"]
     labels, number = list(point["LABELS"]["value"]), 2
     while (more := f"LABELS{number}") in point:
         labels += list(point[more]["value"])
         number += 1
-    return labels[: c3d["data"]["points"].shape[1]]
-
-
-def _marker_columns(c3d: Any) -> np.ndarray:
-    """Points that are markers, not angles or forces of a model."""
-    point = c3d["parameters"]["POINT"]
     outputs = {label for name in MODEL_OUTPUTS if name in point for label in point[name]["value"]}
-    kept = (k for k, label in enumerate(_labels(c3d)) if label not in outputs)
-    return np.array(list(kept), dtype=int)
+    labels = labels[: c3d["data"]["points"].shape[1]]
+    return {k: label for k, label in enumerate(labels) if label not in outputs}
 
 
 def _scale_m(c3d: Any, file: object) -> float:
@@ -240,17 +238,17 @@ def _scale_m(c3d: Any, file: object) -> float:
 
 
 def _instruments(
-    c3d: Any, columns: np.ndarray, wired: list[WiredPlate], scale: float
+    c3d: Any, markers: dict[int, str], wired: list[WiredPlate], scale: float
 ) -> Instruments:
-    points = scale * c3d["data"]["points"][:3, columns].transpose(2, 1, 0)
-    labels, analogs = _labels(c3d), c3d["data"]["analogs"][0]
+    points = scale * c3d["data"]["points"][:3, list(markers)].transpose(2, 1, 0)
+    analogs = c3d["data"]["analogs"][0]
     readings = np.array([plate.reading(analogs) for plate in wired])
     rate = float(c3d["parameters"]["POINT"]["RATE"]["value"][0])
     ratio = max(analogs.shape[1] // max(len(points), 1), 1)
     if not wired:
         readings = np.zeros((0, ratio * len(points), 6))
     return Instruments(
-        labels=tuple(labels[k] for k in columns),
+        labels=tuple(markers.values()),
         points_m=points,
         marker_hz=rate,
         plates=tuple(plate.plate for plate in wired),
@@ -299,12 +297,3 @@ def _put_points(
     residuals[0, columns[markers], frames] = np.select([lost, was_lost], [-1.0, 0.0], kept)
     c3d["data"]["points"] = points
     c3d["data"]["meta_points"]["residuals"] = residuals
-
-
-def _put_forces(c3d: Any, wired: list[WiredPlate], before: Instruments, after: Instruments) -> None:
-    """Channels whose plate reads otherwise."""
-    analogs = c3d["data"]["analogs"].copy()
-    for plate, old, new in zip(wired, before.readings, after.readings, strict=True):
-        if not np.array_equal(old, new, equal_nan=True):
-            analogs[0, plate.channels] = plate.changed(analogs[0], new - old)
-    c3d["data"]["analogs"] = analogs

@@ -51,7 +51,8 @@ def together(people: Mapping[str, StatedPerson]) -> tuple[StatedPerson, tuple[st
 
     A value on which they do not agree is not used.
     """
-    agreed, notes = {}, []
+    agreed: dict[str, float | None] = {}
+    notes = []
     for what, unit, plural in (("mass_kg", "kg", "masses"), ("height_m", "m", "heights")):
         values = {n: v for n, p in people.items() if (v := getattr(p, what)) is not None}
         if values and _differ(values.values()):
@@ -63,7 +64,7 @@ def together(people: Mapping[str, StatedPerson]) -> tuple[StatedPerson, tuple[st
     if len(set(sexes.values())) > 1:
         notes.append(f"its files state different sexes: {sexes}; none used")
     sex = "".join(set(sexes.values())) if len(set(sexes.values())) == 1 else ""
-    return StatedPerson(**agreed, sex=sex), tuple(notes)
+    return StatedPerson(agreed.get("mass_kg"), agreed.get("height_m"), sex), tuple(notes)
 
 
 def against_table(

@@ -103,7 +103,8 @@ class C3dPlate:
         return None
 
     def lever_m(self, reading: PlateReading) -> np.ndarray:
-        return np.hypot(*cop_at_height(*self._at_sensor(reading), 0.0).T)
+        force, moment = self._at_sensor(reading)
+        return np.hypot(*cop_at_height(force, moment, 0.0).T)
 
     def sensors_log_likelihood(self, reading: PlateReading) -> float:
         """The load at a point of a bending plate goes to the four corners as that point's distances

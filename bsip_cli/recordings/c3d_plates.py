@@ -250,8 +250,8 @@ def _channel_table(content: Content) -> tuple[np.ndarray, list[Finding]]:
         "counted from 0": table + 1,
         "stored by rows": by_rows,
         "stored by rows and counted from 0": by_rows + 1,
-        "with a row for each plate": table.T,
-        "with a row for each plate and counted from 0": table.T + 1,
+        "stored with a row for each plate": table.T,
+        "stored with a row for each plate and counted from 0": table.T + 1,
     }
     labels = texts(content.group("ANALOG"), "LABELS")[: len(content.analog)]
     measuring = ["".join((_AXIS.findall(label.upper()) or [""])[-1]) for label in labels]

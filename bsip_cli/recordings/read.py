@@ -215,20 +215,16 @@ def _about_written(written: Written) -> list[Finding]:
 def _about_frame(frame: FrameChange) -> list[Finding]:
     if not frame.moved:
         return []
+    check, expected, level = "mirrored", "a right-handed frame", "corrected"
+    found = "left and right are exchanged all over the body: a left-handed laboratory frame"
+    more = "; if instead left and right labels are exchanged, rename them"
     if frame.moved == "forces":
-        check, expected = "frame", "markers and forces in one frame"
+        check, expected, more = "frame", "markers and forces in one frame", ""
         found = "the forces lie under the feet and go with the motion in another frame only"
-        action = f"{frame.words()}, in all trials"
         if frame.unsure_m > ALIKE_M:
-            action += f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
-            action += "know how the plates lie, correct their corners"
-            return [Finding(check, "", found, expected, action, "warning")]
-    else:
-        check, expected = "mirrored", "a right-handed frame"
-        found = "left and right are exchanged all over the body: a left-handed laboratory frame"
-        action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
-        action += "rename them"
-    return [Finding(check, "", found, expected, action, "corrected")]
+            more = f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
+            more, level = f"{more}know how the plates lie, correct their corners", "warning"
+    return [Finding(check, "", found, expected, f"{frame.words()}, in all trials{more}", level)]
 
 
 def delay_words(delay_s: float) -> str:

@@ -245,7 +245,12 @@ def _instruments(
     readings = np.array([plate.reading(analogs) for plate in wired])
     rate = float(c3d["parameters"]["POINT"]["RATE"]["value"][0])
     ratio = max(analogs.shape[1] // max(len(points), 1), 1)
-    if not wired:
+    up = np.array([0.0, 0.0, 1.0])
+    if wired:  # the lab axis nearest to the first plate's normal, to the side where the markers are
+        plate = wired[0].plate
+        axis = int(np.argmax(np.abs(plate.axes[:, 2])))
+        up = np.sign(np.nanmedian(points[..., axis]) - plate.centre_m[axis]) * np.eye(3)[axis]
+    else:
         readings = np.zeros((0, ratio * len(points), 6))
     return Instruments(
         labels=tuple(markers.values()),
@@ -254,18 +259,8 @@ def _instruments(
         plates=tuple(plate.plate for plate in wired),
         readings=readings,
         analog_hz=rate * ratio,
-        up=_up(points, wired),
+        up=up,
     )
-
-
-def _up(points_m: np.ndarray, wired: list[WiredPlate]) -> np.ndarray:
-    """The lab axis nearest to the first plate's normal, to the side where the markers are."""
-    if not wired:
-        return np.array([0.0, 0.0, 1.0])
-    plate = wired[0].plate
-    axis = int(np.argmax(np.abs(plate.axes[:, 2])))
-    above = np.nanmedian(points_m[..., axis]) - plate.centre_m[axis]
-    return np.sign(above) * np.eye(3)[axis]
 
 
 def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:

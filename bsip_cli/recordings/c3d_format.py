@@ -18,6 +18,7 @@ _C3D_KEY = 0x50
 _PC, _DEC, _MIPS = 84, 85, 86  # processors; files of the last are hardly met, and are refused
 _TEXT, _BYTE, _INTEGER, _FLOAT = -1, 1, 2, 4  # the size of one is the absolute value
 _MOST_RECORDS = 20_000
+_MOST_EMPTY = 255  # texts without letters, of which a torn file may claim any number
 
 Value = tuple[str, ...] | np.ndarray
 Group = Mapping[str, Value]
@@ -189,7 +190,7 @@ def _value(content: bytes, at: int, name: str, processor: int) -> Value:
         raise _BrokenError(f"{name} claims {size} bytes, more than there are")
     if kind == _TEXT:
         width, *others = shape or (1,)
-        n = 0 if shape == (0,) else math.prod(others)
+        n = size // width if width else min(math.prod(others), _MOST_EMPTY) * bool(others)
         return tuple(_text(raw[k * width : (k + 1) * width]) for k in range(n))
     if kind == _BYTE:
         flat = np.frombuffer(raw, np.uint8)

@@ -135,6 +135,13 @@ def test_records_may_end_with_the_last_byte_before_the_data(tmp_path):
         _parameters_of(tmp_path, head + group + b"\5")
 
 
+def test_texts_without_letters_fill_no_memory(tmp_path):
+    group = bytes([5, 255]) + b"POINT" + struct.pack("<H", 3) + bytes([0])
+    text = bytes([1, 1]) + b"X" + struct.pack("<H", 0) + bytes([255, 6, 0, *[255] * 5, 0])
+    head = bytes([2, 80]).ljust(BLOCK, b"\0") + bytes([1, 80, 1, PC])
+    assert _parameters_of(tmp_path, head + group + text + bytes(4))["POINT"]["X"] == ("",) * 255
+
+
 def test_numbers_of_a_good_file(tmp_path, content):
     point = _parameters_of(tmp_path, content)["POINT"]
     assert number(point, "RATE") == 100.0

@@ -269,7 +269,8 @@ class _Correction:
     @cached_property
     def _plates(self) -> dict[str, PlateReading]:
         names = [source.name for source in self._opened.sources]
-        found = {name: self._session.plates.get(name, Verdict()) for name in names}
+        plates = self._session.plates_of(self._opened.recording.path.stem)
+        found = {name: plates.get(name, Verdict()) for name in names}
         return {n: one.reading for n, one in found.items() if not (one.refusal or one.repeats)}
 
     def _wrench(self, name: str, reading: PlateReading) -> np.ndarray:

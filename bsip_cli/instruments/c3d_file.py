@@ -40,11 +40,10 @@ class WiredPlate:
         """(N, 6) of the analog data (all channels, N)."""
         read = analogs[self.channels].T @ self.matrix.T
         if self.has_points:
-            read[:, 3:] = np.cross(_level(read[:, 3:5]), read[:, :3]) + read[:, 5:] * [
-                0.0,
-                0.0,
-                1.0,
-            ]
+            force, (x, y, torque) = read[:, :3], read[:, 3:].T.copy()
+            level = np.stack([x, y, np.zeros(len(x))], axis=1)
+            read[:, 3:] = np.cross(level, force)
+            read[:, 5] += torque
         return read
 
     def changed(self, analogs: np.ndarray, change: np.ndarray) -> np.ndarray:
@@ -59,7 +58,7 @@ class WiredPlate:
             point = np.where(
                 loaded[:, None], np.stack([-my, mx], axis=1) / under[:, None], read[:, 3:5]
             )
-            about = mz - np.cross(_level(point), force)[:, 2]
+            about = mz - (point[:, 0] * force[:, 1] - point[:, 1] * force[:, 0])
             change = np.column_stack([force, point, about]) - read
         return analogs[self.channels] + np.linalg.pinv(self.matrix) @ change.T
 
@@ -97,11 +96,17 @@ def _wired(c3d: Any, group: Any, index: int, file: object) -> WiredPlate:
         )
     channels = np.asarray(group["CHANNEL"]["value"])[: _CHANNELS[kind], index].astype(int) - 1
     origin = np.ravel(np.asarray(group["ORIGIN"]["value"], dtype=float)[:, index])
-    axes, centre = _axes(extracted["corners"] * length)
+    corners = extracted["corners"] * length  # (3, 4), in the order +x+y, -x+y, -x-y, +x-y
+    x = corners[:, 0] - corners[:, 1]
+    z = np.cross(x, corners[:, 0] - corners[:, 3])
+    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    axes, centre = np.stack([x, np.cross(z, x), z], axis=1), corners.mean(axis=1)
+    # Where the surface's centre may lie from the sensor, plate axes: as is written, with the other
+    # height, or, as the format means it of a positive height, from the centre to the sensor.
+    offset = length * origin * {1: [0, 0, 0], 3: [0, 0, 1]}.get(kind, [1, 1, 1])
+    sensors = [offset, offset * [1, 1, -1], -offset]
     analogs = np.nan_to_num(c3d["data"]["analogs"][0])
-    for matrix, sensor in product(
-        _matrices(kind, group, index, origin, length, unit), _sensors(kind, origin * length)
-    ):
+    for matrix, sensor in product(_matrices(kind, group, index, origin, length, unit), sensors):
         place = SensingPlate(axes, centre, centre - axes @ sensor)
         wired = WiredPlate(place, channels, matrix, has_points=kind == 1)
         if _agrees(wired, analogs, extracted, unit):
@@ -111,59 +116,32 @@ def _wired(c3d: Any, group: Any, index: int, file: object) -> WiredPlate:
     )
 
 
-def _axes(corners_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axes (3, 3) and centre (3,) from corners (3, 4) in the order +x+y, -x+y, -x-y, +x-y."""
-    x = corners_m[:, 0] - corners_m[:, 1]
-    z = np.cross(x, corners_m[:, 0] - corners_m[:, 3])
-    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
-    return np.stack([x, np.cross(z, x), z], axis=1), corners_m.mean(axis=1)
-
-
 def _matrices(
     kind: int, group: Any, index: int, origin: np.ndarray, length: float, unit: float
 ) -> list[np.ndarray]:
     """What may lead from channels to N and N m."""
-    if kind == 3:
+    scale = np.diag(np.repeat([1.0, unit], 3))
+    if kind == 3:  # fx12 fx34 fy14 fy23 fz1 fz2 fz3 fz4, sensors at (+-a, +-b)
         a, b = np.abs(origin[:2]) * length
-        return [sign * _of_eight(a, b) for sign in (1.0, -1.0)]
+        one = np.array(
+            [
+                [1, 1, 0, 0, 0, 0, 0, 0],
+                [0, 0, 1, 1, 0, 0, 0, 0],
+                [0, 0, 0, 0, 1, 1, 1, 1],
+                [0, 0, 0, 0, b, b, -b, -b],
+                [0, 0, 0, 0, -a, a, a, -a],
+                [-b, b, a, -a, 0, 0, 0, 0],
+            ]
+        )
+        return [one, -one]
     if kind == 1:
         both = product((1.0, -1.0), (length, 1.0, 1e-3))
         return [np.diag([s, s, s, points, points, s * unit]) for s, points in both]
-    scale = np.diag(np.repeat([1.0, unit], 3))
     if kind == 2:
         return [scale, -scale]
     calibration = np.asarray(group["CAL_MATRIX"]["value"], dtype=float)[:6, :6, index]
     variants = [calibration, calibration.T]
     return [scale @ (sign * matrix) for matrix in variants for sign in (1.0, -1.0)]
-
-
-def _of_eight(a: float, b: float) -> np.ndarray:
-    """(6, 8) of TYPE 3: fx12 fx34 fy14 fy23 fz1 fz2 fz3 fz4, sensors at (+-a, +-b)."""
-    return np.array(
-        [
-            [1, 1, 0, 0, 0, 0, 0, 0],
-            [0, 0, 1, 1, 0, 0, 0, 0],
-            [0, 0, 0, 0, 1, 1, 1, 1],
-            [0, 0, 0, 0, b, b, -b, -b],
-            [0, 0, 0, 0, -a, a, a, -a],
-            [-b, b, a, -a, 0, 0, 0, 0],
-        ]
-    )
-
-
-def _level(points: np.ndarray) -> np.ndarray:
-    """(N, 3) of points (N, 2) in the surface."""
-    return np.pad(points, ((0, 0), (0, 1)))
-
-
-def _sensors(kind: int, origin_m: np.ndarray) -> list[np.ndarray]:
-    """Where the surface's centre may lie from the sensor, plate axes: as is written, with the
-    other height, or, as the format means it where the height is positive, from the centre to the
-    sensor."""
-    if kind == 1:
-        return [np.zeros(3)]
-    place = np.array([0.0, 0.0, origin_m[2]]) if kind == 3 else origin_m
-    return [place, place * [1.0, 1.0, -1.0], -place]
 
 
 def _agrees(wired: WiredPlate, analogs: np.ndarray, extracted: Any, unit: float) -> bool:
@@ -204,14 +182,18 @@ def rewrite_c3d(
     except (OSError, RuntimeError, ValueError) as error:
         raise BadDataError(f"ezc3d cannot read it ({error})", file=source) from error
     wired = wired_plates(c3d, source)
-    columns = _marker_columns(c3d)
-    before = _instruments(c3d, columns, wired, source)
+    markers, scale = _markers(c3d), _scale_m(c3d, source)
+    before = _instruments(c3d, markers, wired, scale)
     after = change(before)
     _cut(c3d, before, after)
     first = before.first_frame_of(after)
     kept = before.frames(first, first + len(after.points_m))
-    _put_points(c3d, columns, kept, after)
-    _put_forces(c3d, wired, kept, after)
+    _put_points(c3d, np.array(list(markers), dtype=int), kept, after, scale)
+    analogs = c3d["data"]["analogs"].copy()
+    for plate, old, new in zip(wired, kept.readings, after.readings, strict=True):
+        if not np.array_equal(old, new, equal_nan=True):
+            analogs[0, plate.channels] = plate.changed(analogs[0], new - old)
+    c3d["data"]["analogs"] = analogs
     if after.marker_hz != before.marker_hz:
         for group in ("POINT", "ANALOG"):
             rate = c3d["parameters"][group]["RATE"]
@@ -235,23 +217,17 @@ def _write(c3d: Any, copy: Path, source: Path) -> None:
         partial.unlink(missing_ok=True)
 
 
-def _labels(c3d: Any) -> list[str]:
-    """POINT:LABELS, LABELS2 and so on."""
+def _markers(c3d: Any) -> dict[int, str]:
+    """The labels (POINT:LABELS, LABELS2 and so on) of points that are markers, not angles or forces
+    of a model, by column."""
     point = c3d["parameters"]["POINT"]
-    labels = list(point["LABELS"]["value"])
-    number = 2
-    while f"LABELS{number}" in point and len(labels) < c3d["data"]["points"].shape[1]:
-        labels += list(point[f"LABELS{number}"]["value"])
+    labels, number = list(point["LABELS"]["value"]), 2
+    while (more := f"LABELS{number}") in point:
+        labels += list(point[more]["value"])
         number += 1
-    return labels
-
-
-def _marker_columns(c3d: Any) -> np.ndarray:
-    """Points that are markers, not angles or forces of a model."""
-    point = c3d["parameters"]["POINT"]
     outputs = {label for name in MODEL_OUTPUTS if name in point for label in point[name]["value"]}
-    labels = _labels(c3d)[: c3d["data"]["points"].shape[1]]
-    return np.array([k for k, label in enumerate(labels) if label not in outputs], dtype=int)
+    labels = labels[: c3d["data"]["points"].shape[1]]
+    return {k: label for k, label in enumerate(labels) if label not in outputs}
 
 
 def _scale_m(c3d: Any, file: object) -> float:
@@ -262,34 +238,29 @@ def _scale_m(c3d: Any, file: object) -> float:
 
 
 def _instruments(
-    c3d: Any, columns: np.ndarray, wired: list[WiredPlate], file: object
+    c3d: Any, markers: dict[int, str], wired: list[WiredPlate], scale: float
 ) -> Instruments:
-    points = _scale_m(c3d, file) * c3d["data"]["points"][:3, columns].transpose(2, 1, 0)
-    labels, analogs = _labels(c3d), c3d["data"]["analogs"][0]
+    points = scale * c3d["data"]["points"][:3, list(markers)].transpose(2, 1, 0)
+    analogs = c3d["data"]["analogs"][0]
     readings = np.array([plate.reading(analogs) for plate in wired])
     rate = float(c3d["parameters"]["POINT"]["RATE"]["value"][0])
     ratio = max(analogs.shape[1] // max(len(points), 1), 1)
-    if not wired:
+    up = np.array([0.0, 0.0, 1.0])
+    if wired:  # the lab axis nearest to the first plate's normal, to the side where the markers are
+        plate = wired[0].plate
+        axis = int(np.argmax(np.abs(plate.axes[:, 2])))
+        up = np.sign(np.nanmedian(points[..., axis]) - plate.centre_m[axis]) * np.eye(3)[axis]
+    else:
         readings = np.zeros((0, ratio * len(points), 6))
     return Instruments(
-        labels=tuple(labels[k] for k in columns),
+        labels=tuple(markers.values()),
         points_m=points,
         marker_hz=rate,
         plates=tuple(plate.plate for plate in wired),
         readings=readings,
         analog_hz=rate * ratio,
-        up=_up(points, wired),
+        up=up,
     )
-
-
-def _up(points_m: np.ndarray, wired: list[WiredPlate]) -> np.ndarray:
-    """The lab axis nearest to the first plate's normal, to the side where the markers are."""
-    if not wired:
-        return np.array([0.0, 0.0, 1.0])
-    plate = wired[0].plate
-    axis = int(np.argmax(np.abs(plate.axes[:, 2])))
-    above = np.nanmedian(points_m[..., axis]) - plate.centre_m[axis]
-    return np.sign(above) * np.eye(3)[axis]
 
 
 def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:
@@ -305,11 +276,13 @@ def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:
     header["last_frame"] = header["first_frame"] + frames - 1
 
 
-def _put_points(c3d: Any, columns: np.ndarray, before: Instruments, after: Instruments) -> None:
+def _put_points(
+    c3d: Any, columns: np.ndarray, before: Instruments, after: Instruments, scale: float
+) -> None:
     """Markers that changed; a lost one stays as it was written."""
     gone = np.isnan(before.points_m) & np.isnan(after.points_m)
     frames, markers = np.nonzero(~((before.points_m == after.points_m) | gone).all(axis=2))
-    placed = after.points_m[frames, markers].T / _scale_m(c3d, "")
+    placed = after.points_m[frames, markers].T / scale
     lost = np.isnan(placed).any(axis=0)
     was_lost = np.isnan(before.points_m[frames, markers]).any(axis=1)
     points = c3d["data"]["points"].copy()
@@ -319,12 +292,3 @@ def _put_points(c3d: Any, columns: np.ndarray, before: Instruments, after: Instr
     residuals[0, columns[markers], frames] = np.select([lost, was_lost], [-1.0, 0.0], kept)
     c3d["data"]["points"] = points
     c3d["data"]["meta_points"]["residuals"] = residuals
-
-
-def _put_forces(c3d: Any, wired: list[WiredPlate], before: Instruments, after: Instruments) -> None:
-    """Channels whose plate reads otherwise."""
-    analogs = c3d["data"]["analogs"].copy()
-    for plate, old, new in zip(wired, before.readings, after.readings, strict=True):
-        if not np.array_equal(old, new, equal_nan=True):
-            analogs[0, plate.channels] = plate.changed(analogs[0], new - old)
-    c3d["data"]["analogs"] = analogs

@@ -54,19 +54,25 @@ def rewrite_trc_mot(
     before = _instruments(markers, forces, sets, scale, trc)
     after = change(before)
     other_rate = before.marker_hz != after.marker_hz
-    moved = other_rate or not np.array_equal(before.points_m, after.points_m, equal_nan=True)
-    loaded = other_rate or not np.array_equal(before.readings, after.readings, equal_nan=True)
-    _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
-    _write(
-        copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
-        _new_mot(forces, sets, before, after, said) if loaded else _same_mot(mot, forces, said),
+    moved, loaded = (
+        other_rate
+        or not np.array_equal(getattr(before, name), getattr(after, name), equal_nan=True)
+        for name in ("points_m", "readings")
     )
+    _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
+    content: str | bytes = mot.read_bytes()
+    if loaded:
+        content = _new_mot(forces, sets, before, after, said)
+    elif said:  # other markers alone are told there as well: a TRC file has no place for it
+        content = "\n".join([*forces.head[:-2], *said, *_lines(mot)[len(forces.head) - 2 :]]) + "\n"
+    _write(copy.with_name(copy.stem + mot.name[len(trc.stem) :]), content)
     return after
 
 
 def _read_trc(file: Path) -> Table:
     lines = _lines(file)
-    start = next((k for k in range(5, min(8, len(lines))) if _is_row(lines[k])), 0)
+    is_row = [bool(re.match(r"\s*\d+\s+[-\d.]", line)) for line in lines[:8]]
+    start = next((k for k in range(5, len(is_row)) if is_row[k]), 0)
     if not start or not lines[0].startswith("PathFileType"):
         raise BadDataError("this is no TRC file", file=file)
     width = 2 + 3 * len(_trc_labels(lines[:start]))
@@ -89,10 +95,6 @@ def _lines(file: Path) -> list[str]:
         return file.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
         raise BadDataError(f"it cannot be read ({error.strerror})", file=file) from error
-
-
-def _is_row(line: str) -> bool:
-    return bool(re.match(r"\s*\d+\s+[-\d.]", line))
 
 
 def _values(lines: list[str], separator: str | None, least: int, file: Path) -> np.ndarray:
@@ -165,26 +167,24 @@ def _instruments(
     even = np.abs(times - times[0] - step * np.arange(len(times))).max() < UNEVEN_SHARE * step
     if not even and ratio != 1:
         raise BadDataError("the frames' times are uneven", expected="even ones", file=file)
-    acting = [forces.values[:, columns] for columns in sets]
-    plates = tuple(map(_plate, acting))
-    readings = np.stack([_reading(*both) for both in zip(acting, plates, strict=True)])
+    plates, readings = [], []
+    for acting in (forces.values[:, columns] for columns in sets):
+        plates.append(plate := _plate(acting))
+        force, point, torque = _known(acting, plate)
+        readings.append(plate.reading(force, np.cross(point, force) + torque, np.zeros(3)))
+    # The lab axis that carries most of the force.
+    total = np.nansum(np.stack(readings)[..., :3], axis=(0, 1))
     return Instruments(
         labels=tuple(labels),
         points_m=points,
         marker_hz=1.0 / step,
-        plates=plates,
-        readings=readings,
+        plates=tuple(plates),
+        readings=np.stack(readings),
         analog_hz=ratio / step,
-        up=_up(readings),
+        up=np.eye(3)[int(np.argmax(np.abs(total)))],
         stamps_s=None if even else times - times[0],
         surfaces_known=False,
     )
-
-
-def _up(readings: np.ndarray) -> np.ndarray:
-    """The lab axis that carries most of the force."""
-    force = np.nansum(readings[..., :3], axis=(0, 1))
-    return np.eye(3)[int(np.argmax(np.abs(force)))]
 
 
 def _plate(acting: np.ndarray) -> SensingPlate:
@@ -203,12 +203,6 @@ def _known(acting: np.ndarray, plate: SensingPlate) -> list[np.ndarray]:
     """Force, point and torque (N, 3); the point is the sensor's in rows that do not say where."""
     force, point, torque = np.hsplit(acting, 3)
     return [force, np.where(np.isfinite(point), point, plate.sensor_m), np.nan_to_num(torque)]
-
-
-def _reading(acting: np.ndarray, plate: SensingPlate) -> np.ndarray:
-    """(N, 6) force and its moment about the sensor."""
-    force, point, torque = _known(acting, plate)
-    return plate.reading(force, np.cross(point, force) + torque, np.zeros(3))
 
 
 def _with_reading(
@@ -248,7 +242,10 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
         elif name.endswith("Rate") and slower != 1:
             facts[k] = f"{_number(fact) / slower:.9g}"
     head[2] = "\t".join(facts)
-    rows = ["\t".join([f"{row[0]:.0f}", *map(_cell, row[1:])]) for row in values]
+    rows = [
+        "\t".join([f"{row[0]:.0f}", *("" if np.isnan(x) else f"{x:.9g}" for x in row[1:])])
+        for row in values
+    ]
     return "\n".join([*head, *rows]) + "\n"
 
 
@@ -268,19 +265,6 @@ def _new_mot(
     head[-2:-2] = said  # before the line endheader and the names
     rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]
     return "\n".join([*head, *rows]) + "\n"
-
-
-def _same_mot(mot: Path, table: Table, said: Sequence[str]) -> str | bytes:
-    """Other markers alone are told there as well: a TRC file has no place for it."""
-    if not said:
-        return mot.read_bytes()
-    lines = _lines(mot)
-    lines[len(table.head) - 2 : len(table.head) - 2] = said
-    return "\n".join(lines) + "\n"
-
-
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.9g}"
 
 
 def _write(file: Path, content: str | bytes) -> None:

@@ -76,7 +76,10 @@ def check_samples(
             stuck[:, i] = bool(channels[0, i])
             silent += [] if channels[0, i] else [i]
             continue
-        clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
+        size = np.abs(np.nan_to_num(channel))
+        is_count = np.abs(size - np.rint(size)) < 0.01
+        clipped |= long_runs(is_count & np.isin(np.rint(size), _RAILS), 2)  # the converter's limit
+        clipped |= _cut_off(channel, rate_hz)
         stuck[:, i] = _stuck(channel, noise, load, gone, spikes, rate_hz, channels.shape[1])
         noisy += noise
         if stuck[:, i].any() and not np.nan_to_num(channel).any():
@@ -212,12 +215,6 @@ def long_runs(mask: np.ndarray, least: int) -> np.ndarray:
     for start, stop in intervals[np.diff(intervals, axis=1)[:, 0] >= least]:
         kept[start:stop] = True
     return kept
-
-
-def _at_rail(counts: np.ndarray) -> np.ndarray:
-    whole = np.rint(np.nan_to_num(counts))
-    is_count = np.abs(np.nan_to_num(counts) - whole) < 0.01
-    return long_runs(is_count & np.isin(np.abs(whole), _RAILS), 2)
 
 
 def _cut_off(signal: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -1,30 +1,24 @@
-"""The C3D format as far as it is followed before ezc3d may: numbers, header, parameters,
-and where both state counts, rates or scales, which of them is believed.
-
-A torn chain of parameters makes ezc3d fill gigabytes of memory for minutes, and the counts that
-parameters and header give must be compared with the file's size before anything is read by them.
-"""
+"""The C3D format: numbers, header and parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.recordings.model import Finding, refusal
-from bsip_cli.recordings.text_tables import MOST_HZ
+from bsip_cli.recordings.model import refusal
 
 BLOCK = 512
-C3D_KEY = 0x50
 FULL = 0xFFFF  # frame number that does not fit the header's word
-PC, DEC, MIPS = 84, 85, 86  # processors; ezc3d knows no numbers of the last, which is refused
-TEXT, BYTE, INTEGER, FLOAT = -1, 1, 2, 4  # the size of one is the absolute value
-LONGEST_DESCRIPTION = 127  # ezc3d reads the length as a signed byte
+_C3D_KEY = 0x50
+_PC, _DEC, _MIPS = 84, 85, 86  # processors; files of the last are hardly met, and are refused
+_TEXT, _BYTE, _INTEGER, _FLOAT = -1, 1, 2, 4  # the size of one is the absolute value
 _MOST_RECORDS = 20_000
+_MOST_EMPTY = 255  # texts without letters, of which a torn file may claim any number
 
 Value = tuple[str, ...] | np.ndarray
 Group = Mapping[str, Value]
@@ -36,14 +30,14 @@ Parameters = Mapping[str, Group]
 
 def integers(raw: bytes) -> np.ndarray:
     """Signed 16-bit integers."""
-    return np.frombuffer(raw, "<i2").astype(np.int16)
+    return np.frombuffer(raw, "<i2")
 
 
 def floats(raw: bytes, processor: int) -> np.ndarray:
     """32-bit floats as float64: IEEE, or of a VAX, whose high word comes first and whose exponent
     is larger by two."""
     with np.errstate(invalid="ignore"):  # bits of a signalling NaN
-        if processor != DEC:
+        if processor != _DEC:
             return np.frombuffer(raw, "<f4").astype(float)
         high, low = np.frombuffer(raw, "<u2").reshape(-1, 2).T.astype(np.uint32)
         values = ((high << 16) | low).view(np.float32).astype(float) / 4
@@ -120,14 +114,14 @@ def read_header(path: Path, content: bytes) -> Header:
     if not content:
         remedy = "copy or export the trial again"
         raise refusal(path, "the file is empty", "a C3D file", remedy)
-    if len(content) < BLOCK or content[1] != C3D_KEY or content[0] < 1:
+    if len(content) < BLOCK or content[1] != _C3D_KEY or content[0] < 1:
         raise refusal(path, f"no C3D header in a file of {len(content)} bytes", "a C3D file")
     at = (content[0] - 1) * BLOCK + 3
     processor = content[at] if at < len(content) else 0
-    if processor not in (PC, DEC):
+    if processor not in (_PC, _DEC):
         raise BadDataError(
             f"its parameter section names processor {processor}"
-            f"{' (MIPS)' if processor == MIPS else ''}, which ezc3d does not read",
+            f"{' (MIPS)' if processor == _MIPS else ''}, which ezc3d does not read",
             expected="84 (PC) or 85 (DEC)",
             remedy="export the trial again, or convert it to the PC format",
             file=path,
@@ -141,349 +135,78 @@ def read_header(path: Path, content: bytes) -> Header:
 # --- the chain of parameters ----------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Record:
-    """One group (negative id) or parameter, its value as stored."""
-
-    group: int
-    name: str
-    description: bytes
-    is_plain: bool  # as ezc3d wants it: no gap to the next record, no long description
-    kind: int = BYTE
-    shape: tuple[int, ...] = (0,)
-    value: bytes = b""
-
-    def numbers(self, processor: int) -> np.ndarray:
-        """The value in its shape, first index fastest; empty for a text."""
-        if self.kind == TEXT:
-            return np.zeros(0)
-        if self.kind == BYTE:
-            flat = np.frombuffer(self.value, np.uint8).astype(np.int16)
-        else:
-            is_float = self.kind == FLOAT
-            flat = floats(self.value, processor) if is_float else integers(self.value)
-        return flat.reshape(self.shape or (1,), order="F")
-
-
 class _BrokenError(Exception):
     """Where the chain of records cannot be followed; turned into a BadDataError."""
 
 
-def read_records(path: Path, content: bytes) -> list[Record]:
-    """All records in their order; ``content`` is the file up to its data."""
-    found: list[Record] = []
-    position: int | None = (content[0] - 1) * BLOCK + 4
+def read_parameters(path: Path, content: bytes, processor: int) -> Parameters:
+    """All parameters by group and name; ``content`` is the file up to its data."""
+    groups: dict[int, str] = {}
+    values: list[tuple[int, str, Value]] = []
+    at = (content[0] - 1) * BLOCK + 4
     try:
-        while position is not None and len(found) < _MOST_RECORDS:
-            position = _follow(content, position, found)
+        for _ in range(_MOST_RECORDS):
+            if not 0 <= at < len(content):
+                raise _BrokenError("its records run into the data")
+            if not (n_letters := abs(_signed(content[at]))):
+                break
+            after = at + 2 + n_letters
+            letters = content[at + 2 : after]
+            if len(content) < after + 4 or not all(32 <= byte < 127 for byte in letters):
+                raise _BrokenError(f"the record at byte {at} has no readable name")
+            number = _signed(content[at + 1])
+            name = letters.decode("ascii").strip().upper()
+            if number == 0:
+                raise _BrokenError(f"{name} belongs to no group")
+            if number < 0:
+                groups[-number] = name
+            else:
+                values.append((number, name, _value(content, after + 2, name, processor)))
+            step = content[after] + 256 * content[after + 1]
+            if not step:
+                break
+            at = after + step
     except _BrokenError as fault:
         told = f"its parameter section is broken: {fault}"
         raise refusal(path, told, "a standard C3D file") from fault
+    found: dict[str, dict[str, Value]] = {name: {} for name in groups.values()}
+    for number, name, value in values:
+        if number in groups:
+            found[groups[number]][name] = value
     return found
 
 
-def _follow(content: bytes, at: int, found: list[Record]) -> int | None:
-    """Add the record at a byte to those found; where the next one is, None behind the last."""
-    if not 0 <= at < len(content):
-        raise _BrokenError("its records run into the data")
-    if not (n_letters := abs(_signed(content[at]))):
-        return None
-    after = at + 2 + n_letters
-    letters = content[at + 2 : after]
-    if len(content) < after + 4 or not all(32 <= byte < 127 for byte in letters):
-        raise _BrokenError(f"the record at byte {at} has no readable name")
-    group = _signed(content[at + 1])
-    name, step = letters.decode("ascii").strip().upper(), content[after] + 256 * content[after + 1]
-    kind, value, end = BYTE, b"", after + 2
-    shape: tuple[int, ...] = (0,)
-    if group == 0:
-        raise _BrokenError(f"{name} belongs to no group")
-    if group > 0:
-        kind, rank = _signed(content[end]), content[end + 1]
-        if kind not in (TEXT, BYTE, INTEGER, FLOAT) or rank > 7:
-            raise _BrokenError(f"{name} has type {kind} and {rank} dimensions")
-        start = end + 2 + rank
-        shape = tuple(content[end + 2 : start])
-        size = abs(kind) * math.prod(shape)
-        value, end = content[start : start + size], start + size
-        if len(value) < size or len(shape) < rank:
-            raise _BrokenError(f"{name} claims {size} bytes, more than there are")
-    stop = end + 1 + (content[end] if end < len(content) else 0)
-    description = content[end + 1 : stop]
-    is_plain = step in (0, stop - after) and len(description) <= LONGEST_DESCRIPTION
-    found.append(Record(group, name, description, is_plain, kind, shape, value))
-    return after + step if step else None
+def _value(content: bytes, at: int, name: str, processor: int) -> Value:
+    """Of the parameter whose type stands at a byte: texts, or numbers in their shape, first index
+    fastest."""
+    kind, rank = _signed(content[at]), content[at + 1]
+    if kind not in (_TEXT, _BYTE, _INTEGER, _FLOAT) or rank > 7:
+        raise _BrokenError(f"{name} has type {kind} and {rank} dimensions")
+    start = at + 2 + rank
+    shape = tuple(content[at + 2 : start])
+    size = abs(kind) * math.prod(shape)
+    raw = content[start : start + size]
+    if len(raw) < size or len(shape) < rank:
+        raise _BrokenError(f"{name} claims {size} bytes, more than there are")
+    if kind == _TEXT:
+        width, *others = shape or (1,)
+        n = size // width if width else min(math.prod(others), _MOST_EMPTY) * bool(others)
+        return tuple(_text(raw[k * width : (k + 1) * width]) for k in range(n))
+    if kind == _BYTE:
+        flat = np.frombuffer(raw, np.uint8)
+    else:
+        flat = floats(raw, processor) if kind == _FLOAT else integers(raw)
+    return flat.reshape(shape or (1,), order="F")
+
+
+def _text(raw: bytes) -> str:
+    """Without filling blanks; bytes that are no UTF-8 are Latin-1."""
+    try:
+        known = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        known = raw.decode("latin-1")
+    return known.replace("\0", " ").strip()
 
 
 def _signed(byte: int) -> int:
     return byte - 256 if byte > 127 else byte
-
-
-def group_names(records: Sequence[Record]) -> Mapping[int, str]:
-    """Names of the groups by their (positive) number."""
-    return {-record.group: record.name for record in records if record.group < 0}
-
-
-def parameters_of(records: Sequence[Record], processor: int) -> Parameters:
-    """The numeric parameters by group and name; texts count as empty."""
-    names = group_names(records)
-    found: dict[str, dict[str, Value]] = {name: {} for name in names.values()}
-    for record in records:
-        if record.group in names:
-            found[names[record.group]][record.name] = record.numbers(processor)
-    return found
-
-
-# --- what header and parameters both state: the file's size judges between them -------------------
-
-
-_SAME = 1e-3
-_WORD = 0x10000
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Counts of one frame and of all, and where the first lies."""
-
-    n_points: int
-    n_channels: int
-    samples_per_frame: int
-    n_frames: int
-    is_float: bool
-    start: int  # byte
-
-    @property
-    def words_per_frame(self) -> int:
-        return 4 * self.n_points + self.n_channels * self.samples_per_frame
-
-    @property
-    def bytes_per_frame(self) -> int:
-        return self.words_per_frame * (4 if self.is_float else 2)
-
-    @property
-    def n_bytes(self) -> int:
-        return self.n_frames * self.bytes_per_frame
-
-    def room(self, file_size: int) -> int:
-        """Bytes from the first frame to the end of the file."""
-        return max(file_size - self.start, 0)
-
-    def fits(self, file_size: int) -> bool:
-        """The file holds it, but for a last partial block."""
-        return self.n_frames > 0 and 0 < self.n_bytes <= self.room(file_size) + BLOCK
-
-    def ends_with(self, file_size: int) -> bool:
-        """The file ends with the data or fills its last block behind them."""
-        rest = file_size - self.start - self.n_bytes
-        return rest == 0 or (file_size % BLOCK == 0 and 0 < rest <= BLOCK)
-
-    def describe(self) -> str:
-        return (
-            f"{self.n_points} points, {self.n_channels} channels of {self.samples_per_frame} "
-            f"samples, {self.n_frames} frames from byte {self.start}"
-        )
-
-
-def decided_layout(
-    path: Path, header: Header, parameters: Parameters, file_size: int
-) -> tuple[Layout, list[Finding]]:
-    """The layout of the data, and a finding where header and parameters disagree.
-
-    A layout that wants more bytes than the file holds is out (a last partial block is
-    forgiven); one that ends with the file goes first. Where the file's length does not decide,
-    it is refused: ezc3d takes the parameters' word, and was wrong in 3 of 5 real files.
-    """
-    stated = _by_header(header, parameters, file_size)
-    other = _by_parameters(stated, parameters)
-    if stated.n_frames < 1 or stated.words_per_frame < 1 or stated.start < BLOCK:
-        stated = other
-    both = f"the header counts {stated.describe()}, the parameters {other.describe()}"
-    fitting = [layout for layout in dict.fromkeys((stated, other)) if layout.fits(file_size)]
-    fitting = [layout for layout in fitting if layout.ends_with(file_size)] or fitting
-    if not fitting:
-        raise _too_large(path, stated, file_size)
-    if len(fitting) == 2:
-        raise refusal(path, f"{both}, and the file's length fits both", "one count of each")
-    wanted = fitting[0]
-    in_file = wanted.room(file_size) // wanted.bytes_per_frame
-    chosen = replace(wanted, n_frames=min(wanted.n_frames, in_file))
-    said = []
-    if stated != other:
-        said.append((both, "one count of each", f"read {chosen.describe()}"))
-    if missing := wanted.n_frames - chosen.n_frames:
-        found = f"the file ends {missing} frames early"
-        said.append((found, f"{wanted.n_frames} frames", f"read {chosen.n_frames}"))
-    if not chosen.ends_with(file_size):  # bytes came in or went
-        rest = file_size - chosen.start - chosen.n_bytes
-        found = f"{rest} bytes follow the data that the header counts"
-        expected = f"none, or as many as fill the last {BLOCK} bytes"
-        said.append((found, expected, "read the data where the header says"))
-    return chosen, [Finding("layout", "", *words, "warning") for words in said]
-
-
-def _too_large(path: Path, stated: Layout, file_size: int) -> BadDataError:
-    if stated.words_per_frame < 1:
-        found = "it holds no points and no analog samples"
-        return refusal(path, found, "markers", "export the trial with its markers")
-    found = (
-        f"the header promises {stated.n_bytes} bytes of data ({stated.n_points} points, "
-        f"{stated.n_frames} frames) and the file holds {stated.room(file_size)}"
-    )
-    return refusal(path, found, "a complete file", "copy or export the trial again")
-
-
-def _by_header(header: Header, parameters: Parameters, file_size: int) -> Layout:
-    samples = max(header.samples_per_frame, 1)
-    layout = Layout(
-        n_points=header.n_points,
-        n_channels=header.n_analog_per_frame // samples,
-        samples_per_frame=samples,
-        n_frames=header.n_frames,
-        is_float=header.scale < 0,
-        start=(max(header.data_start_block, 1) - 1) * BLOCK,
-    )
-    if header.is_full or header.n_frames < 1:
-        in_file = layout.room(file_size) // max(layout.bytes_per_frame, 1)
-        return replace(layout, n_frames=_many_frames(parameters) or in_file)
-    return layout
-
-
-def _many_frames(parameters: Parameters) -> int:
-    """The count of frames that does not fit the header, 0 if nothing shows it.
-
-    TRIAL's fields of two words each, the low word first, or a float.
-    """
-    trial, point, ends = parameters.get("TRIAL", {}), parameters.get("POINT", {}), []
-    for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"):
-        words = trial.get(name)
-        if isinstance(words, np.ndarray) and words.size == 2:
-            low, high = np.ravel(words).astype(int) & 0xFFFF
-            ends.append(float(low + 65536 * high))
-    span = [ends[1] - ends[0] + 1] if len(ends) == 2 else []
-    for count in (*span, number(point, "LONG_FRAMES"), number(point, "FRAMES")):
-        if np.isfinite(count) and count > 0:
-            return int(min(count, 2**40))
-    return 0
-
-
-def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
-    """What the groups POINT and ANALOG say, the header's where they say nothing."""
-    point, analog = parameters.get("POINT", {}), parameters.get("ANALOG", {})
-    n_points, n_frames = _count(point, "USED"), _count(point, "FRAMES")
-    n_channels, block = _count(analog, "USED"), _count(point, "DATA_START")
-    if n_frames == FULL or (n_frames is not None and n_frames == stated.n_frames & FULL):
-        n_frames = None  # the count that does not fit
-    return replace(
-        stated,
-        n_points=stated.n_points if n_points is None else n_points,
-        n_channels=stated.n_channels if n_channels is None else n_channels,
-        n_frames=n_frames or stated.n_frames,
-        start=(block - 1) * BLOCK if block is not None and block > 1 else stated.start,
-    )
-
-
-def _count(group: Group, name: str) -> int | None:
-    """A count, stored as an integer without sign or as a float."""
-    value = number(group, name)
-    if not np.isfinite(value) or abs(value) > 1e9:
-        return None
-    return int(value) & 0xFFFF if value < 0 else int(value)
-
-
-# --- rates and scales -----------------------------------------------------------------------------
-
-
-def decided_rate(
-    path: Path, header: Header, parameters: Parameters, layout: Layout
-) -> tuple[float, list[Finding]]:
-    """Frames per second, and findings where the file's statements of rates differ."""
-    stated = number(parameters.get("POINT", {}), "RATE")
-    usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < MOST_HZ]
-    if not usable:
-        found, remedy = f"POINT:RATE is {stated:g} Hz", "export the trial with its rate"
-        raise refusal(path, found, "a rate above 0 Hz", remedy)
-    rate_hz, findings = usable[0], []
-    if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
-        found = f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz"
-        action = f"read {rate_hz:g} Hz"
-        findings.append(Finding("rate", "points", found, "one rate", action, "warning"))
-    analog_hz = number(parameters.get("ANALOG", {}), "RATE")
-    real_hz = rate_hz * layout.samples_per_frame
-    if layout.n_channels and not abs(analog_hz / real_hz - 1) <= _SAME:
-        found = (
-            f"ANALOG:RATE says {analog_hz:g} Hz, and each frame of the markers at "
-            f"{rate_hz:g} Hz has {layout.samples_per_frame} samples"
-        )
-        expected = f"{real_hz:g} Hz"
-        findings.append(Finding("rate", "analog", found, expected, f"read {expected}", "corrected"))
-    return rate_hz, findings
-
-
-def decided_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
-    """Size of one count of the coordinates, negative where they are floats, as ezc3d wants it."""
-    stated = number(parameters.get("POINT", {}), "SCALE")
-    if not np.isfinite(stated) or stated == 0:
-        stated = header.scale if np.isfinite(header.scale) and header.scale else 1.0
-    size = abs(stated)
-    if header.scale < 0:
-        return -size, []
-    if abs(size - header.scale) <= _SAME * size:
-        return size, []
-    found = f"POINT:SCALE is {stated:g}, the header says {header.scale:g}"
-    return size, [Finding("scale", "points", found, "one scale", f"used {size:g}", "warning")]
-
-
-def about_scales(group: Group, n_channels: int) -> list[Finding]:
-    """A warning where there are scales, and not for all channels."""
-    n_scales = np.ravel(numbers(group, "SCALE")).size
-    if n_scales == 0 or n_scales >= n_channels:
-        return []
-    found = f"ANALOG:SCALE has {n_scales} numbers for {n_channels} channels"
-    action = f"took 1 for those after the {n_scales}th; export the trial again"
-    return [Finding("scale", "analog", found, "one for each channel", action, "warning")]
-
-
-@dataclass(frozen=True, eq=False)
-class Scaling:
-    """Of the analog channels: (count - offset) x scale, each (n_channels,)."""
-
-    scales: np.ndarray
-    offsets: np.ndarray
-    is_unsigned: bool
-
-    def applied(self, counts: np.ndarray, is_float: bool) -> np.ndarray:
-        """Counts of the converter (n_channels, n) as the file scales them."""
-        if self.is_unsigned and not is_float:
-            counts = np.where(counts < 0, counts + _WORD, counts)
-        with np.errstate(invalid="ignore", over="ignore"):
-            return (counts - self.offsets[:, None]) * self.scales[:, None]
-
-
-def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
-    """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise.
-
-    What the file says may be no number, or zero: a plate of such channels is left out. An offset at
-    either end of counts with a sign is the middle of counts without.
-    """
-    general = number(group, "GEN_SCALE") if np.size(group.get("GEN_SCALE", ())) else 1.0
-    scales, offsets = np.ones(n_channels), np.zeros(n_channels)
-    for values, name in ((scales, "SCALE"), (offsets, "OFFSET")):
-        given = np.ravel(numbers(group, name))[:n_channels]
-        values[: len(given)] = given
-    with np.errstate(invalid="ignore", over="ignore"):
-        scales *= general
-    is_unsigned = is_unsigned or bool((np.abs(offsets) >= _WORD // 2 - 1).any())
-    if is_unsigned:
-        offsets = np.where(offsets < 0, offsets + _WORD, offsets)
-    return Scaling(scales, offsets, is_unsigned)
-
-
-def says_unsigned(records: Sequence[Record]) -> bool:
-    """ANALOG:FORMAT: whether integer samples and offsets have no sign."""
-    names = group_names(records)
-    formats = [
-        record.value
-        for record in records
-        if record.kind == TEXT and (names.get(record.group), record.name) == ("ANALOG", "FORMAT")
-    ]
-    return bool(formats) and formats[-1].strip().startswith(b"UNSIGNED")

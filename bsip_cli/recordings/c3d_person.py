@@ -51,24 +51,20 @@ def together(people: Mapping[str, StatedPerson]) -> tuple[StatedPerson, tuple[st
 
     A value on which they do not agree is not used.
     """
-    notes: list[str] = []
-
-    def agreed(what: str, unit: str) -> float | None:
+    agreed: dict[str, float | None] = {}
+    notes = []
+    for what, unit, plural in (("mass_kg", "kg", "masses"), ("height_m", "m", "heights")):
         values = {n: v for n, p in people.items() if (v := getattr(p, what)) is not None}
-        if not values:
-            return None
-        if _differ(values.values()):
+        if values and _differ(values.values()):
             of = ", ".join(f"{value:.4g} {unit} in {name}" for name, value in values.items())
-            notes.append(f"its files state different {what.rpartition('_')[0]}es: {of}; none used")
-            return None
-        return next(iter(values.values()))
-
-    mass, height = agreed("mass_kg", "kg"), agreed("height_m", "m")
+            notes.append(f"its files state different {plural}: {of}; none used")
+        else:
+            agreed[what] = next(iter(values.values()), None)
     sexes = {name: person.sex for name, person in people.items() if person.sex}
     if len(set(sexes.values())) > 1:
         notes.append(f"its files state different sexes: {sexes}; none used")
-    sex = next(iter(sexes.values())) if len(set(sexes.values())) == 1 else ""
-    return StatedPerson(mass, height, sex), tuple(notes)
+    sex = "".join(set(sexes.values())) if len(set(sexes.values())) == 1 else ""
+    return StatedPerson(agreed.get("mass_kg"), agreed.get("height_m"), sex), tuple(notes)
 
 
 def against_table(
@@ -108,19 +104,18 @@ def _readings(
     parameters: Parameters, quantity: Quantity, findings: list[Finding]
 ) -> tuple[Reading, ...]:
     """What the value may be that all places state; nothing where they contradict each other."""
-    said: list[tuple[str, tuple[Reading, ...]]] = []
+    said: dict[str, tuple[Reading, ...]] = {}
     for name, group, parameter in _named(parameters, quantity.names):
         of_units = tuple(f"{parameter.casefold()}{ending}" for ending in ("_units", "_unit"))
         beside = [p for p in group if p.casefold() in of_units]
         spelt = [quantity.unit_spelt(text) for p in beside for text in texts(group, p)]
         for value in _values(group[parameter]):
             if readings := readings_of(value, quantity, next(filter(None, spelt), "")):
-                said.append((f"{name}:{parameter} = {value}", readings))
-    if said and _differ(readings[0].value for _, readings in said):
-        places = ", ".join(place for place, _ in said)
-        findings.append(_unused(places, f"one {quantity.column}"))
+                said[f"{name}:{parameter} = {value}"] = readings
+    if said and _differ(readings[0].value for readings in said.values()):
+        findings.append(_unused(", ".join(said), f"one {quantity.column}"))
         return ()
-    return said[0][1] if said else ()
+    return next(iter(said.values()), ())
 
 
 def _values(value: tuple[str, ...] | np.ndarray) -> list[str]:
@@ -135,7 +130,7 @@ def _pair(
 ) -> tuple[float | None, float | None]:
     """Mass and height in the units with which they make a person; None for what stays open."""
     if masses and heights:
-        pairs = _of_people(masses, heights) or _of_people(_all_units(masses, MASS), heights)
+        pairs = _of_people(masses, heights) or _of_people(_in_all_units(masses), heights)
         heights = tuple(dict.fromkeys(h for _, h in pairs)) or heights
         if len(masses) > 1:
             masses = tuple(dict.fromkeys(m for m, _ in pairs)) or masses
@@ -160,15 +155,14 @@ def _of_people(
     return [(m, h) for m in masses for h in heights if is_usual_pair(m.value, h.value)]
 
 
-def _all_units(masses: tuple[Reading, ...], quantity: Quantity) -> list[Reading]:
+def _in_all_units(masses: Sequence[Reading]) -> Sequence[Reading]:
     """A mass in the unit it was taken for, and in those it may be in."""
     if len(masses) > 1:
-        return list(masses)
+        return masses
     (stated,) = masses
-    number = stated.value / quantity.units[stated.unit]
-    values = {unit: number * quantity.units[unit] for unit in quantity.guessed}
-    known = {unit: value for unit, value in values.items() if quantity.holds(value)}
-    return [Reading(value, unit, unit == stated.unit) for unit, value in known.items()]
+    number = stated.value / MASS.units[stated.unit]
+    found = [Reading(number * MASS.units[u], u, u == stated.unit) for u in MASS.guessed]
+    return [one for one in found if MASS.holds(one.value)]
 
 
 def _differ(values: Iterable[float]) -> bool:

@@ -132,7 +132,11 @@ def plate_fits(
     """Of readings that all put the plate in the same place."""
     (place,) = {reading.place_of for reading in readings}
     seen = [PlateTrial.of(k, t, name, place) for k, t in enumerate(trials) if name in t.sources]
-    readings = [_centred(replace(reading, sign=1), seen) for reading in readings]
+    readings = [replace(reading, sign=1) for reading in readings]
+    points = [one.source for one in seen if isinstance(one.source, ForceOnPoint)]
+    readings = [
+        ForceOnPoint.with_centre(points, one) if one.about == "fixed" else one for one in readings
+    ]
     matrices, found, push, pull = [], [], 0.0, 0.0
     for one in seen:
         every = np.array([one.source.matrix(reading) for reading in readings])  # (r, 6, k)
@@ -168,14 +172,6 @@ def _evidence(one: PlateTrial, readings: Sequence[PlateReading], wrench: np.ndar
     lever = None if levers[0] is None else np.array(levers)
     where = one.feet, one.apart, one.corners_m, lever, level_Nm, one.body_m, one.passes
     return evidence(wrench, floors, *where)
-
-
-def _centred(reading: PlateReading, seen: Sequence[PlateTrial]) -> PlateReading:
-    """With the fixed point that suits all trials, if the moments are about one."""
-    if reading.about != "fixed":
-        return reading
-    some = [one.source for one in seen if isinstance(one.source, ForceOnPoint)]
-    return ForceOnPoint.with_centre(some, reading)
 
 
 # --- of all plates, in axes that are the same for all ---------------------------------------------

@@ -103,6 +103,11 @@ class PlateReading:
         own = CHANNELS_OF[kind]
         return np.eye(len(own)) if own == CHANNELS else self.channel_matrix(own)
 
+    def in_units(self, moments: float, points: float) -> PlateReading:
+        """With numbers of another size, of the same sign."""
+        sign = -1.0 if self.moment_scale < 0 else 1.0
+        return replace(self, moment_scale=sign * moments, point_scale=points)
+
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
         done = [
@@ -110,14 +115,11 @@ class PlateReading:
             "reversed the moments against the forces" * (self.moment_scale < 0),
             _POINT_SCALES.get(self.point_scale, ""),
             _ABOUT[self.about],
+            self.channels,
+            f"exchanged its place with that of {self.place_of}" * bool(self.place_of),
+            "took the corners in the other direction round" * self.mirrored,
+            f"turned the plate's axes by {90 * self.turn} degrees" * bool(self.turn),
         ]
-        done.append(self.channels)
-        if self.place_of:
-            done.append(f"exchanged its place with that of {self.place_of}")
-        if self.mirrored:
-            done.append("took the corners in the other direction round")
-        if self.turn:
-            done.append(f"turned the plate's axes by {90 * self.turn} degrees")
         return ", ".join(filter(None, done))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d, uniform_filter1d
 from scipy.signal import upfirdn
 
-from bsip_cli.recordings.analog import long_runs, runs
+from bsip_cli.recordings.analog import long_runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.trunk_motion import in_flight
@@ -28,32 +28,40 @@ _FEWEST_LOW = 2  # markers seen low in a frame: the feet are in view
 _AFTER_STEP_S = 0.1  # beside a frame that is not clear
 
 
-@dataclass(frozen=True, eq=False)
-class PlateZero:
-    """A plate's reading in its unloaded intervals."""
+def without_zeros(
+    recording: Recording,
+) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
+    """The plates without what they read without load, and that, (6,) by plate: N and N m about the
+    world's origin."""
+    plates, findings, zeros = [], [], {}
+    rate_hz = recording.analog_rate_hz
+    if recording.plates:
+        flight = in_flight(recording, len(recording.plates[0].usable))
+    for plate in recording.plates:
+        unloaded = unloaded_samples(plate, rate_hz, nobody_near(recording, plate), flight)
+        if unloaded.any():
+            zeros[plate.name] = np.median(plate.wrench()[unloaded], axis=0).tolist()
+        zeroed, finding = subtract_zero(plate, unloaded, rate_hz)
+        plates.append(zeroed)
+        findings.append(finding)
+    return replace(recording, plates=tuple(plates)), findings, zeros
 
-    offset: np.ndarray  # (6,): N and N m about the world origin
-    n_samples: int  # 0: the plate was never seen unloaded, the offset is zero
-    stretches_s: tuple[tuple[float, float], ...]  # from the first sample
 
-    def is_known(self) -> bool:
-        return self.n_samples > 0
-
-
-def plate_zero(
+def unloaded_samples(
     plate: Plate,
     rate_hz: float,
     surely_free: np.ndarray | None = None,
     flight: np.ndarray | None = None,
-) -> PlateZero:
-    """Find unloaded intervals: long, low and quiet in the vertical force, as an instrument reads;
-    without one, those of ``flight`` (n_analog,) bool.
+) -> np.ndarray:
+    """Where a plate bears nobody, (n_analog,) bool: intervals that are long, low and quiet in the
+    vertical force, as an instrument reads; without one, those of ``flight`` (n_analog,) bool in
+    which it reads the same throughout.
 
-    The offset is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near, or the
-    plate reads a steady pull: it was set to zero under the person.
+    What it reads there is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near,
+    or the plate reads a steady pull: it was set to zero under the person.
     """
     if (pulled := steady_pull(plate, rate_hz)).any():
-        return _zero_of(plate, pulled, rate_hz)
+        return pulled
     width = max(1, round(_WINDOW_S * rate_hz))
     mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
     # Shorter zeros are noise about a software's threshold, and part of what the plate reads.
@@ -65,29 +73,26 @@ def plate_zero(
         if abs(level) >= _LARGEST_N:  # it counts wherever the plate reads it while nobody is near
             unloaded = free & (np.abs(mean - level) < _LARGEST_N)
     unloaded = long_runs(unloaded, max(2, round(_LEAST_S * rate_hz)))
-    if not unloaded.any() and flight is not None:
-        unloaded = _quiet_in(plate, flight & heard, rate_hz)
-    if not unloaded.any():
-        return PlateZero(np.zeros(6), 0, ())
-    return _zero_of(plate, unloaded, rate_hz)
+    if unloaded.any() or flight is None or not (aloft := flight & heard).any():
+        return unloaded
+    lift = uniform_filter1d(plate.force_N[:, 2], max(1, round(_WINDOW_S / 4 * rate_hz)))[aloft]
+    return aloft & bool(np.ptp(np.percentile(lift, [5, 95])) < _QUIET_N)
 
 
-def without_zeros(
-    recording: Recording,
-) -> tuple[Recording, list[Finding], dict[str, list[float]]]:
-    """The plates without what they read without load, and that, (6,) by plate: N and N m about the
-    world's origin."""
-    done, zeros = [], {}
-    if recording.plates:
-        flight = in_flight(recording, len(recording.plates[0].usable))
-    for plate in recording.plates:
-        free = nobody_near(recording, plate)
-        zero = plate_zero(plate, recording.analog_rate_hz, free, flight)
-        done.append(subtract_zero(plate, zero))
-        if zero.is_known():
-            zeros[plate.name] = zero.offset.tolist()
-    zeroed = replace(recording, plates=tuple(plate for plate, _ in done))
-    return zeroed, [finding for _, finding in done], zeros
+def subtract_zero(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> tuple[Plate, Finding]:
+    """The plate without what it reads ``unloaded`` (n_analog,) bool, and the line for the quality
+    table."""
+    found, action, level = "no quiet interval without load", "left its zero as it is", "info"
+    if is_silent(plate.wrench()).any():
+        found = "exactly 0 without load, as software writes it"
+    if unloaded.any():
+        offset = np.median(plate.wrench()[unloaded], axis=0)
+        force = ", ".join(f"{value:.1f}" for value in offset[:3])
+        found = f"({force}) N in {unloaded.sum() / rate_hz:.1f} s without load"
+        action, level = "subtracted it", "corrected" if is_noticed(offset) else "info"
+        force_N, moment_Nm = plate.force_N - offset[:3], plate.moment_Nm - offset[3:]
+        plate = replace(plate, force_N=force_N, moment_Nm=moment_Nm)
+    return plate, Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)
 
 
 def is_silent(wrench: np.ndarray) -> np.ndarray:
@@ -109,38 +114,6 @@ def steady_pull(plate: Plate, rate_hz: float) -> np.ndarray:
     lowest = min(np.percentile(mean, 1), -_LARGEST_N)
     pulls = plate.usable & (spread < _QUIET_N) & (mean < lowest + _QUIET_N)
     return long_runs(pulls, max(2, round(_PULLED_S * rate_hz)))
-
-
-def _quiet_in(plate: Plate, flight: np.ndarray, rate_hz: float) -> np.ndarray:
-    """The flight in which a plate reads the same throughout, (n_analog,) bool."""
-    if not flight.any():
-        return flight
-    lift = uniform_filter1d(plate.force_N[:, 2], max(1, round(_WINDOW_S / 4 * rate_hz)))[flight]
-    return flight & bool(np.ptp(np.percentile(lift, [5, 95])) < _QUIET_N)
-
-
-def _zero_of(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> PlateZero:
-    samples = plate.wrench()[unloaded]
-    return PlateZero(
-        offset=np.median(samples, axis=0),
-        n_samples=int(unloaded.sum()),
-        stretches_s=tuple((a / rate_hz, b / rate_hz) for a, b in runs(unloaded)),
-    )
-
-
-def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
-    """The plate without its offset, and the line for the quality table."""
-    found, action, level = "no quiet interval without load", "left its zero as it is", "info"
-    if is_silent(plate.wrench()).any():
-        found = "exactly 0 without load, as software writes it"
-    if zero.is_known():
-        seconds = sum(stop - start for start, stop in zero.stretches_s)
-        force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])
-        found, action = f"({force}) N in {seconds:.1f} s without load", "subtracted it"
-        level = "corrected" if is_noticed(zero.offset) else "info"
-        force_N, moment_Nm = plate.force_N - zero.offset[:3], plate.moment_Nm - zero.offset[3:]
-        plate = replace(plate, force_N=force_N, moment_Nm=moment_Nm)
-    return plate, Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)
 
 
 def lost_baseline(

@@ -9,7 +9,7 @@ when one is described badly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class PlateDescription:
     name: str
     kind: int  # FORCE_PLATFORM:TYPE, 1 to 4
     corners_m: np.ndarray  # (4, 3)
-    origin_m: np.ndarray  # (3,), see `LocalWrench.at_surface`; type 3: sensor distances a, b, az0
+    origin_m: np.ndarray  # (3,), see `surface_offset_m`; type 3: sensor distances a, b, az0
     cop_polynomial: np.ndarray | None = None  # (2, 6), see `cop_shift_m`
 
     def centre_m(self) -> np.ndarray:
@@ -62,34 +62,6 @@ class PlateDescription:
         if self.kind == 3:  # the first two are sensor distances and no offset
             return np.array([0.0, 0.0, -abs(self.origin_m[2])])
         return -self.origin_m if self.origin_m[2] > 0 else self.origin_m
-
-
-@dataclass(frozen=True, eq=False)
-class LocalWrench:
-    """Force [N] and moment [N m] in the plate frame, (n, 3) each, at the sensor's origin."""
-
-    force_N: np.ndarray
-    moment_Nm: np.ndarray
-
-    def at_surface(self, origin_m: np.ndarray) -> LocalWrench:
-        """The moment about the centre of the surface.
-
-        ``origin_m`` (3,) runs from the sensor's origin to that centre, so z < 0.
-        """
-        return replace(self, moment_Nm=self.moment_Nm + np.cross(self.force_N, origin_m))
-
-    def cop(self) -> np.ndarray:
-        """Centre of pressure on the surface, plate frame, (n, 2); NaN without load."""
-        return cop_at_height(self.force_N, self.moment_Nm, 0.0)
-
-    def to_world(
-        self, plate: PlateDescription, rotation_world_lab: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Of a wrench at the surface force and moment about the world origin, (n, 3) each."""
-        rotation = rotation_world_lab @ plate.rotation_lab_plate()
-        force = self.force_N @ rotation.T
-        centre = rotation_world_lab @ plate.centre_m()
-        return force, self.moment_Nm @ rotation.T + np.cross(centre, force)
 
 
 def crossing(vector: np.ndarray) -> np.ndarray:
@@ -144,8 +116,9 @@ def wrench_matrix(plate: PlateDescription) -> np.ndarray:
     )
 
 
-def cop_shift_m(wrench: LocalWrench, plate: PlateDescription) -> np.ndarray:
-    """By how much the maker's polynomial moves the centre of pressure of a surface wrench, (n, 2).
+def cop_shift_m(cop_m: np.ndarray, plate: PlateDescription) -> np.ndarray:
+    """By how much the maker's polynomial moves a centre of pressure on the surface, plate frame,
+    (n, 2).
 
     Kistler, manual of the force plate type 9287C, section 8.4.3: x is lessened by
     (P1 y^4 + P2 y^2 + P3) x^3 + (P4 y^4 + P5 y^2 + P6) x, y likewise with x and y exchanged;
@@ -154,7 +127,7 @@ def cop_shift_m(wrench: LocalWrench, plate: PlateDescription) -> np.ndarray:
     """
     assert plate.cop_polynomial is not None
     limits, shifts = plate.half_size_m(), []
-    x, y = np.clip(np.nan_to_num(wrench.cop()), -limits, limits).T * _MM
+    x, y = np.clip(np.nan_to_num(cop_m), -limits, limits).T * _MM
     for p, along, across in zip(plate.cop_polynomial, (x, y), (y, x), strict=True):
         cubic, linear = (p[k] * across**4 + p[k + 1] * across**2 + p[k + 2] for k in (0, 3))
         shifts.append(cubic * along**3 + linear * along)

@@ -25,8 +25,8 @@ from bsip_cli.recordings.plates import (
     CHANNELS,
     LIGHT_N,
     LOADED_N,
-    LocalWrench,
     PlateDescription,
+    cop_at_height,
     cop_shift_m,
     crossing,
     wrench_matrix,
@@ -91,21 +91,20 @@ class C3dPlate:
 
     def plate(self, reading: PlateReading) -> Plate:
         description = self.read_description(reading)
-        surface, shift_m = self._at_surface(reading), self._shift_m(reading)
-        if shift_m is not None:
-            moment = surface.moment_Nm.copy()
-            moment[:, 0] -= shift_m[:, 1] * surface.force_N[:, 2]
-            moment[:, 1] += shift_m[:, 0] * surface.force_N[:, 2]
-            surface = replace(surface, moment_Nm=moment)
-        force, moment = surface.to_world(description, self.rotation_world_lab)
+        force, moment = np.split(self.measured @ self.matrix(reading).T, 2, axis=1)
+        if (moved := self._shift(reading)) is not None:
+            (x, y), load = moved
+            axes = reading.sign * self.rotation_world_lab @ description.rotation_lab_plate()
+            moment = moment + np.column_stack([-y * load, x * load]) @ axes[:, :2].T
         corners = description.corners_m @ self.rotation_world_lab.T
-        return Plate(self.name, reading.sign * force, reading.sign * moment, corners, self.usable)
+        return Plate(self.name, force, moment, corners, self.usable)
 
     def level_matrices(self, reading: PlateReading) -> None:
         return None
 
     def lever_m(self, reading: PlateReading) -> np.ndarray:
-        return np.hypot(*self._wrench(reading).cop().T)
+        force, moment = self._at_sensor(reading)
+        return np.hypot(*cop_at_height(force, moment, 0.0).T)
 
     def sensors_log_likelihood(self, reading: PlateReading) -> float:
         """The load at a point of a bending plate goes to the four corners as that point's distances
@@ -155,10 +154,10 @@ class C3dPlate:
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         """The maker's correction of the centre of pressure; force and vertical moment stay."""
-        if (shift_m := self._shift_m(reading)) is None:
+        if (moved := self._shift(reading)) is None:
             return []
-        under_load = shift_m[np.abs(self._at_surface(reading).force_N[:, 2]) > LOADED_N]
-        largest_mm = 1e3 * np.max(np.linalg.norm(under_load, axis=1), initial=0.0)
+        shift_m, load = moved
+        largest_mm = 1e3 * np.max(np.hypot(*shift_m)[np.abs(load) > LOADED_N], initial=0.0)
         found = "FPCOPPOLY holds the maker's correction of the centre of pressure"
         action = f"applied it: shifts of up to {largest_mm:.1f} mm under load"
         return [Finding("plate_cop", self.name, found, "", action, "info")]
@@ -185,20 +184,19 @@ class C3dPlate:
         axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
         return offset * _Z if axes[2, 2] > 0 else offset
 
-    def _shift_m(self, reading: PlateReading) -> np.ndarray | None:
-        """Of the centre of pressure on the surface, (n, 2); None without a maker's polynomial."""
+    def _shift(self, reading: PlateReading) -> tuple[np.ndarray, np.ndarray] | None:
+        """By how much the maker moves the centre of pressure, plate frame, (2, n), and the load
+        there, (n,), before the sign of a reading; None without a maker's polynomial."""
         description = self.read_description(reading)
         if description.cop_polynomial is None:
             return None
-        return cop_shift_m(self._at_surface(reading), description)
+        force, moment = self._at_sensor(reading)
+        moment = moment + np.cross(force, self._surface_m(reading))
+        return cop_shift_m(cop_at_height(force, moment, 0.0), description).T, force[:, 2]
 
-    def _wrench(self, reading: PlateReading) -> LocalWrench:
-        """At the sensor's origin, before the sign of a reading."""
-        force, moment = np.split(self.measured @ self.local(reading).T, 2, axis=1)
-        return LocalWrench(force, moment)
-
-    def _at_surface(self, reading: PlateReading) -> LocalWrench:
-        return self._wrench(reading).at_surface(self._surface_m(reading))
+    def _at_sensor(self, reading: PlateReading) -> list[np.ndarray]:
+        """Force and moment (n, 3) at the sensor's origin, plate frame, before the sign."""
+        return np.split(self.measured @ self.local(reading).T, 2, axis=1)
 
 
 # --- a force of a table (MOT) ---------------------------------------------------------------------

@@ -103,9 +103,11 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []
+    findings += _about_own_units(session.units_of(recording.path.stem))
+    verdicts = session.plates_of(recording.path.stem)
     by_name = {source.name: source for source in opened.sources}
     for source in opened.sources:
-        verdict = session.plates.get(source.name, _UNLOADED)
+        verdict = verdicts.get(source.name, _UNLOADED)
         if verdict.repeats:
             continue
         if verdict.refusal:
@@ -138,6 +140,15 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         findings=(*recording.findings, *findings),
         forces_note=note,
     )
+
+
+def _about_own_units(units: tuple[float, float] | None) -> list[Finding]:
+    if units is None:
+        return []
+    found = "the moments or points of force are not in the unit of the session's other trials"
+    words = AS_STATED.in_units(*units).words() or "took them as they stand"
+    action, expected = f"{words}, in this trial alone; export all in one unit", "one unit"
+    return [Finding("unit", "forces", found, expected, action, "corrected")]
 
 
 def _without_missing(
@@ -204,20 +215,16 @@ def _about_written(written: Written) -> list[Finding]:
 def _about_frame(frame: FrameChange) -> list[Finding]:
     if not frame.moved:
         return []
+    check, expected, level = "mirrored", "a right-handed frame", "corrected"
+    found = "left and right are exchanged all over the body: a left-handed laboratory frame"
+    more = "; if instead left and right labels are exchanged, rename them"
     if frame.moved == "forces":
-        check, expected = "frame", "markers and forces in one frame"
+        check, expected, more = "frame", "markers and forces in one frame", ""
         found = "the forces lie under the feet and go with the motion in another frame only"
-        action = f"{frame.words()}, in all trials"
         if frame.unsure_m > ALIKE_M:
-            action += f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
-            action += "know how the plates lie, correct their corners"
-            return [Finding(check, "", found, expected, action, "warning")]
-    else:
-        check, expected = "mirrored", "a right-handed frame"
-        found = "left and right are exchanged all over the body: a left-handed laboratory frame"
-        action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
-        action += "rename them"
-    return [Finding(check, "", found, expected, action, "corrected")]
+            more = f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
+            more, level = f"{more}know how the plates lie, correct their corners", "warning"
+    return [Finding(check, "", found, expected, f"{frame.words()}, in all trials{more}", level)]
 
 
 def delay_words(delay_s: float) -> str:

@@ -9,6 +9,7 @@ nothing makes a person of the forces, the plate is left out.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -90,6 +91,7 @@ class SessionReading:
     stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one;
     ``twins`` : where both have them. ``odd`` : by trial that is not as all others are,
     in what: its "sides", its "forces", or the unit of these.
+    ``moment_scales``, ``point_scales`` : by trial whose units are not those of the others.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
@@ -102,6 +104,8 @@ class SessionReading:
     of_others: Mapping[str, str] = field(default_factory=dict)
     twins: Mapping[str, str] = field(default_factory=dict)
     odd: Mapping[str, str] = field(default_factory=dict)
+    moment_scales: Mapping[str, float] = field(default_factory=dict)
+    point_scales: Mapping[str, float] = field(default_factory=dict)
     written: Written = AS_WRITTEN
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
     of_paces: Sequence[Sequence[float]] = field(default=(), compare=False)
@@ -115,6 +119,19 @@ class SessionReading:
         """Nothing makes a person of any plate."""
         counting = [one for one in self.plates.values() if not one.repeats]
         return bool(counting) and all(one.refusal for one in counting)
+
+    def units_of(self, trial: str) -> tuple[float, float] | None:
+        """Scales of moments and points, where they are not those of the session's other trials."""
+        if trial not in self.moment_scales:
+            return None
+        return self.moment_scales[trial], self.point_scales[trial]
+
+    def plates_of(self, trial: str) -> dict[str, Verdict]:
+        """In the units of a trial."""
+        if (units := self.units_of(trial)) is None:
+            return dict(self.plates)
+        read = {name: one.reading.in_units(*units) for name, one in self.plates.items()}
+        return {name: replace(one, reading=read[name]) for name, one in self.plates.items()}
 
     def gains(self) -> dict[str, float]:
         """Of plates that read another force than the load."""
@@ -155,9 +172,14 @@ def reading_of_files(
 
     stated = stated_kg, stated_m, gross_percent, limits
     found = _reading_of_own(of_own_forces, *stated)
-    if names := _odd_trials(of_own_forces(found.written), found, limits):
-        odd |= dict.fromkeys(names, "forces")
-        found = _reading_of_own(of_own_forces, *stated)
+    if found.is_refused:
+        own = of_own_forces(found.written)
+        alone = {k: session_reading([one], limits) for k, one in enumerate(own) if one.sources}
+        if settled := _of_own_units(own, alone, limits):
+            found = replace(settled, written=found.written)
+        elif names := _odd_trials(own, alone, limits):
+            odd |= dict.fromkeys(names, "forces")
+            found = _reading_of_own(of_own_forces, *stated)
     return replace(found, of_others=of_others, twins=twins, odd=odd)
 
 
@@ -190,16 +212,52 @@ def _height_m(trials: Sequence[TrialSamples], stated_m: float | None) -> float |
     return stated_m or (None if usual is None else usual.height_m)
 
 
+def _of_own_units(
+    trials: Sequence[TrialSamples], alone: Mapping[int, SessionReading], limits: GateLimits
+) -> SessionReading | None:
+    """Where trials contradict each other in units alone, which each file states for itself: those
+    that are sound as they stand, or else most, are the session's, and the others have their own.
+    None where some are nobody's alone, or differ in more than units."""
+    units: dict[int, tuple[float, float]] = {}
+    axes = {one.frame for one in alone.values()}
+    rest: dict[str, set[PlateReading]] = {}
+    for k, one in alone.items():
+        found = {name: v.reading for name, v in one.plates.items() if not v.repeats}
+        own = {(abs(x.moment_scale), x.point_scale) for x in found.values()}
+        for name, x in found.items():
+            bare = replace(x.in_units(1.0, 1.0), centre_m=None, half_size_m=None)
+            rest.setdefault(name, set()).add(bare)
+        if len(own) != 1 or one.refusals():
+            return None
+        (units[k],) = own
+    counts = Counter(units.values())
+    if len(counts) < 2 or len(axes) > 1 or any(len(each) > 1 for each in rest.values()):
+        return None
+    usual = (1.0, 1.0) if (1.0, 1.0) in counts else counts.most_common(1)[0][0]
+    most = session_reading([trials[k] for k in units if units[k] == usual], limits)
+    if most.refusals():
+        return None
+    plates, delays_s = dict(most.plates), dict(most.delays_s)
+    others = {k: both for k, both in units.items() if both != usual}
+    for k in others:
+        plates = {**alone[k].plates, **plates}
+        delays_s |= alone[k].delays_s
+    return replace(
+        most,
+        plates=plates,
+        delays_s=delays_s,
+        moment_scales={trials[k].name: moments for k, (moments, _) in others.items()},
+        point_scales={trials[k].name: points for k, (_, points) in others.items()},
+    )
+
+
 def _odd_trials(
-    trials: Sequence[TrialSamples], found: SessionReading, limits: GateLimits
+    trials: Sequence[TrialSamples], alone: Mapping[int, SessionReading], limits: GateLimits
 ) -> list[str]:
-    """The few trials without which forces that are no person's as ``found`` are one's: half of them
-    at most, which are nobody's even alone, or fewer, which alone are understood alike and otherwise
-    than the others; none if it may be these or those."""
-    if not found.is_refused:
-        return []
-    some = [k for k, one in enumerate(trials) if one.sources]
-    alone = {k: session_reading([trials[k]], limits) for k in some}
+    """The few trials without which forces that together are no person's are one's: half of them
+    at most, which are nobody's even ``alone``, or fewer, which alone are understood alike and
+    otherwise than the others; none if it may be these or those."""
+    some = list(alone)
     own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
     refused = [k for k, one in alone.items() if one.is_refused]
     if 2 * len(refused) > len(some):

@@ -48,9 +48,6 @@ ALLOWED = {
 
 FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}
 
-# ezc3d runs in a process of its own: a damaged file may crash it.
-MAY_ALSO = {"recordings.c3d_content": {"subprocess"}}
-
 # Single modules of a part that may be imported, where the part as a whole may not.
 ONLY = {
     "simulate": {"body": {"body.markersets"}},
@@ -112,7 +109,7 @@ def test_modules_form_no_circle():
 @pytest.mark.parametrize("module", [name for name in sorted(modules()) if package(name) in SCIENCE])
 def test_science_takes_arrays(module):
     """No tables, no printing; of the configuration only where shipped files lie."""
-    assert foreign(module) & FOREIGN_TO_SCIENCE == MAY_ALSO.get(module, set())
+    assert not foreign(module) & FOREIGN_TO_SCIENCE
     assert names_from(module, "bsip_cli.config") <= {"shipped"}
 
 

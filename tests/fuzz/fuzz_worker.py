@@ -88,9 +88,7 @@ def _result(again: Callable[[], Answer], sound: Answer) -> dict:
 
 
 def _cost(start: float) -> dict[str, float]:
-    children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss  # ezc3d runs in one
-    peak_kb = max(_own_peak_kb(), children)
-    return {"seconds": time.perf_counter() - start, "peak_MB": peak_kb / 1024}
+    return {"seconds": time.perf_counter() - start, "peak_MB": _own_peak_kb() / 1024}
 
 
 def _own_peak_kb() -> int:

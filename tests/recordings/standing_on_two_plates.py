@@ -9,7 +9,7 @@ import numpy as np
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_reading import Opened, PlateSource
-from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.plates import PlateDescription
 from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint, points_that_move
 
 N, RATE_HZ = 400, 100.0
@@ -112,9 +112,9 @@ def of_c3d(
         true = PlateDescription(str(k + 1), 2, corners(k), np.array(origin_m))
         axes = true.rotation_lab_plate()
         moment = free_moment(force) + np.cross(point - CENTRES_M[k], force)
-        local = LocalWrench(sign * force @ axes, sign * moment @ axes)
-        at_sensor = local.at_surface(-np.array(origin_m))
-        channels = np.hstack([at_sensor.force_N, at_sensor.moment_Nm * moment_scale])
+        local, moment = sign * force @ axes, sign * moment @ axes
+        at_sensor = moment - np.cross(local, origin_m)
+        channels = np.hstack([local, at_sensor * moment_scale])
         stated = PlateDescription(
             true.name,
             2,

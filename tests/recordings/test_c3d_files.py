@@ -1,29 +1,22 @@
-"""C3D below its samples: a process of its own, broken and odd parameters, sizes that are none."""
+"""C3D below its plates: samples, broken and odd parameters, sizes that are none."""
 
 from __future__ import annotations
 
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings import c3d_content
-from bsip_cli.recordings.c3d_content import read_by_ezc3d
+from bsip_cli.recordings.c3d_content import about_scales, read_content, scaled
 from bsip_cli.recordings.c3d_format import (
     BLOCK,
-    DEC,
-    PC,
-    about_scales,
     floats,
     integers,
     number,
     numbers,
-    parameters_of,
-    read_records,
-    scaling_of,
+    read_parameters,
     texts,
 )
 from bsip_cli.recordings.read import read_recording
@@ -35,6 +28,7 @@ from tests.recordings.recording_writers import (
 )
 
 N = 30
+PC, DEC = 84, 85
 
 
 def _write_plates(folder: Path, *shares: float) -> Path:
@@ -50,72 +44,21 @@ def path(tmp_path) -> Path:
 
 
 def test_samples_and_parameters_come_back(path):
-    samples = read_by_ezc3d(path.read_bytes(), path)
+    content = read_content(path)
     markers, labels = standing_markers(N)
-    np.testing.assert_allclose(samples.positions, 1e3 * markers, atol=1e-3)
-    assert samples.residuals.shape == (N, len(labels)) and samples.analog.shape == (6, 10 * N)
-    assert texts(samples.parameters["POINT"], "LABELS") == labels
-    assert numbers(samples.parameters["FORCE_PLATFORM"], "CORNERS").shape == (3, 4, 1)
+    np.testing.assert_allclose(content.positions, 1e3 * markers, atol=1e-3)
+    assert content.is_valid.all() and content.is_valid.shape == (N, len(labels))
+    assert content.analog.shape == (6, 10 * N)
+    assert texts(content.group("POINT"), "LABELS") == labels
+    assert numbers(content.group("FORCE_PLATFORM"), "CORNERS").shape == (3, 4, 1)
 
 
 def test_labels_that_are_no_utf8(path):
     content = path.read_bytes()
     label = standing_markers(1)[1][0].encode()
     path.write_bytes(content.replace(label, b"\xe9" + label[1:], 1))
-    labels = texts(read_by_ezc3d(path.read_bytes(), path).parameters["POINT"], "LABELS")
+    labels = texts(read_content(path).group("POINT"), "LABELS")
     assert labels[0] == "\u00e9" + label[1:].decode()
-
-
-@pytest.mark.parametrize(
-    ("child", "words"),
-    [
-        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
-        ("raise SystemExit(7)", "exit code 7"),
-        ("bytearray(10**12)", "MemoryError"),
-        ("import sys; sys.stderr.write('odd bytes.'); sys.exit(3)", "cannot read it: odd bytes"),
-        ("import time; time.sleep(60)", "did not finish within"),
-    ],
-)
-def test_a_child_that_dies_or_hangs_is_one_sentence(path, tmp_path, monkeypatch, child, words):
-    script = tmp_path / "child.py"
-    script.write_text(child)
-    monkeypatch.setattr(c3d_content, "_CHILD", script)
-    monkeypatch.setattr(c3d_content, "_CPU_S", 1)
-    monkeypatch.setattr(c3d_content, "_WALL_PER_CPU", 3)
-    with pytest.raises(BadDataError, match=words) as caught:
-        read_recording(path)
-    assert str(path) in str(caught.value) and caught.value.remedy
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep the limit")
-def test_the_child_has_a_limit_of_memory(path, monkeypatch):
-    monkeypatch.setattr(c3d_content, "_MEMORY_BYTES", 60_000_000)
-    with pytest.raises(BadDataError, match="ezc3d"):
-        read_by_ezc3d(path.read_bytes(), path)
-
-
-def test_other_counts_than_the_files_are_refused(path, monkeypatch):
-    """Whatever ezc3d makes of a file, its counts must be those that fill the file."""
-    shorter = read_by_ezc3d(path.read_bytes(), path)
-    monkeypatch.setattr(
-        c3d_content,
-        "read_by_ezc3d",
-        lambda *_: c3d_content.Samples(
-            shorter.parameters, shorter.positions[:, 1:], shorter.residuals, shorter.analog
-        ),
-    )
-    with pytest.raises(BadDataError, match="ezc3d reads 7 points"):
-        read_recording(path)
-
-
-def test_one_child_for_a_recording(path, monkeypatch):
-    seen = []
-    original = c3d_content.subprocess.run
-    monkeypatch.setattr(
-        c3d_content.subprocess, "run", lambda *a, **k: seen.append(a) or original(*a, **k)
-    )
-    read_recording(path)
-    assert len(seen) == 1
 
 
 def _record(content: bytes, name: str, group: str = "ANALOG") -> int:
@@ -130,13 +73,8 @@ def _check(path) -> None:
     np.testing.assert_allclose(recording.markers_m, standing_markers(N)[0], atol=1e-6)
 
 
-def test_a_sound_file_is_not_written_anew(path, monkeypatch):
-    monkeypatch.setattr(c3d_content, "mended", None)
-    _check(path)
-
-
 def test_offset_as_floats(path):
-    """As `Dance.c3d` has them; ezc3d: OFFSET parameter is not an INT."""
+    """As `Dance.c3d` has them."""
     content = bytearray(path.read_bytes())
     at = _record(content, "OFFSET")
     assert content[at] == 2
@@ -153,7 +91,6 @@ def test_offset_as_floats(path):
 
 
 def test_offset_below_zero(path):
-    """ezc3d drops its sign."""
     content = bytearray(path.read_bytes())
     at = _record(content, "OFFSET")
     content[at + 3 : at + 5] = struct.pack("<h", -5)
@@ -183,7 +120,7 @@ def content(tmp_path) -> bytearray:
 
 
 def _parameters_of(tmp_path, content: bytes):
-    return parameters_of(read_records(tmp_path / "a.c3d", bytes(content)), PC)
+    return read_parameters(tmp_path / "a.c3d", bytes(content), PC)
 
 
 def test_records_may_end_with_the_last_byte_before_the_data(tmp_path):
@@ -191,12 +128,18 @@ def test_records_may_end_with_the_last_byte_before_the_data(tmp_path):
     group = bytes([5, 255]) + b"POINT" + struct.pack("<H", 3) + bytes([0])
     head = bytes([2, 80]).ljust(BLOCK, b"\0") + bytes([1, 80, 1, PC])
     for end in (b"\0\0", b"\0"):
-        (record,) = read_records(tmp_path / "a.c3d", head + group + end)
-        assert record.name == "POINT"
+        assert _parameters_of(tmp_path, head + group + end) == {"POINT": {}}
     with pytest.raises(BadDataError, match="no readable name"):
-        read_records(tmp_path / "a.c3d", head + group[:-1])
+        _parameters_of(tmp_path, head + group[:-1])
     with pytest.raises(BadDataError, match="no readable name"):
-        read_records(tmp_path / "a.c3d", head + group + b"\5")
+        _parameters_of(tmp_path, head + group + b"\5")
+
+
+def test_texts_without_letters_fill_no_memory(tmp_path):
+    group = bytes([5, 255]) + b"POINT" + struct.pack("<H", 3) + bytes([0])
+    text = bytes([1, 1]) + b"X" + struct.pack("<H", 0) + bytes([255, 6, 0, *[255] * 5, 0])
+    head = bytes([2, 80]).ljust(BLOCK, b"\0") + bytes([1, 80, 1, PC])
+    assert _parameters_of(tmp_path, head + group + text + bytes(4))["POINT"]["X"] == ("",) * 255
 
 
 def test_numbers_of_a_good_file(tmp_path, content):
@@ -253,7 +196,6 @@ def test_a_text_where_a_number_belongs_is_no_number(tmp_path, content):
 
 
 def test_a_long_description_is_no_fault(tmp_path, content):
-    """ezc3d reads its length as a signed byte and refuses the file."""
     at = content.find(b"FRAMES") + len(b"FRAMES") + 2
     n = content[at - 2] + 256 * content[at - 1]
     length = content[at + 4]
@@ -299,7 +241,7 @@ def test_scales_that_do_not_reach_all_channels_are_said(n_scales, is_said):
 def test_an_offset_of_half_the_counts_is_of_counts_without_sign(offset, first):
     group = {"OFFSET": np.array([offset, 0.0])}
     counts = np.array([[-32768.0, 32767.0, -32760.0], [3.0, 4.0, 5.0]])
-    found = scaling_of(group, 2, is_unsigned=False).applied(counts, is_float=False)
+    found, _ = scaled(counts, group, is_float=False)
     np.testing.assert_array_equal(found, [first, counts[1]])
 
 

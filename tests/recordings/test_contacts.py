@@ -21,7 +21,7 @@ from bsip_cli.recordings.contacts import (
     plate_noise,
 )
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_wrench import plate_zero, wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import subtract_zero, unloaded_samples, wrench_at_marker_rate
 from bsip_cli.recordings.read import read_recording
 
 RATE_HZ = 100.0
@@ -367,6 +367,7 @@ def test_first_and_last_steps_of_gait_are_left_out(real_data):
 @pytest.mark.real
 def test_unloaded_belt_has_its_offset(real_data):
     recording = read_recording(real_data / "biobuddy_ech/right_knee.c3d")
-    loaded, unloaded = (plate_zero(p, recording.analog_rate_hz) for p in recording.plates)
-    assert not loaded.is_known()
-    assert unloaded.offset[2] == pytest.approx(9.0, abs=0.2)
+    rate_hz, (loaded, belt) = recording.analog_rate_hz, recording.plates
+    assert not unloaded_samples(loaded, rate_hz).any()
+    zeroed, _ = subtract_zero(belt, unloaded_samples(belt, rate_hz), rate_hz)
+    np.testing.assert_allclose((belt.force_N - zeroed.force_N)[:, 2], 9.0, atol=0.2)

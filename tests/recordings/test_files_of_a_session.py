@@ -127,6 +127,27 @@ def test_few_trials_that_are_otherwise_cost_the_others_nothing(sound, odd):
     assert not without.plates and "the other trials" in without.forces_note
 
 
+@pytest.mark.parametrize(
+    ("make", "n_sound", "n_odd", "faults", "words"),
+    [
+        (of_c3d, 1, 1, {"moment_scale": 1e-3}, "in N m, a thousand times"),
+        (of_c3d, 1, 2, {"moment_scale": 1e-3}, "in N m, a thousand times"),
+        (of_table, 2, 1, {"moment_scale": 1e3, "point_scale": 1e3}, "N mm, read the points of"),
+        (of_table, 1, 1, {"point_scale": 1e2}, "points of force in cm"),
+    ],
+)
+def test_trials_in_other_units_cost_the_sound_ones_nothing(make, n_sound, n_odd, faults, words):
+    trials = [named(opened(make()), f"t{k}") for k in range(n_sound)]
+    trials += [named(opened(make(**faults)), f"odd{k}") for k in range(n_odd)]
+    found = reading(trials)
+    assert not found.odd and not found.refusals() and not findings_about(found)
+    assert list(found.moment_scales) == [f"odd{k}" for k in range(n_odd)]
+    sound, *_, odd = (assemble(one, found) for one in trials)
+    for right, own in zip(sound.plates, odd.plates, strict=True):
+        np.testing.assert_allclose(own.moment_Nm, right.moment_Nm, atol=1e-6)
+    assert [words in one.action for one in odd.findings] == [True] and not sound.findings
+
+
 def test_which_of_two_is_odd_is_not_known():
     trials = [named(opened(of_c3d()), "a"), named(opened(exchanged(of_c3d())), "b")]
     assert reading(trials).odd == {}

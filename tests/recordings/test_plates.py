@@ -10,15 +10,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_wrench import (
     lost_baseline,
     nobody_near,
-    plate_zero,
     sample_at_frames,
     silent_frames,
     subtract_zero,
+    unloaded_samples,
     wrench_at_marker_rate,
 )
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
@@ -188,6 +189,11 @@ def test_kistlers_polynomial_moves_the_centre_of_pressure():
     assert finding.level == "info" and "5.1 mm" in finding.action
 
 
+def zero_of(plate: Plate, unloaded: np.ndarray) -> np.ndarray:
+    zeroed, _ = subtract_zero(plate, unloaded, RATE_HZ)
+    return (plate.wrench() - zeroed.wrench())[0]
+
+
 def test_a_large_zero_counts_where_nobody_is_near():
     markers, labels = standing_markers(400)
     plate = _plate(np.full(4000, 300.0), corners_m=CORNERS_M + np.array([5.0, 0, 0]))
@@ -196,9 +202,9 @@ def test_a_large_zero_counts_where_nobody_is_near():
     )
     free = nobody_near(recording, plate)
     assert free.mean() > 0.9
-    assert not plate_zero(plate, RATE_HZ).is_known()
-    zero = plate_zero(plate, RATE_HZ, surely_free=free)
-    assert zero.offset[2] == pytest.approx(300.0)
+    assert not unloaded_samples(plate, RATE_HZ).any()
+    unloaded = unloaded_samples(plate, RATE_HZ, surely_free=free)
+    assert zero_of(plate, unloaded)[2] == pytest.approx(300.0)
     under = _plate(np.full(4000, 300.0))
     assert not nobody_near(recording, under).any()
 
@@ -218,10 +224,10 @@ def test_a_plate_that_is_unloaded_only_in_flight_gets_its_zero_there(ring_N):
         recording = Recording(
             None, 100.0, tuple(labels), jump, RATE_HZ, (plate,), (), np.eye(3), "", 0.0
         )
-        zero = plate_zero(plate, RATE_HZ, flight=in_flight(recording, len(load)))
-        assert zero.is_known() == (seconds == 0.5 and ring_N == 0.0)
-        assert zero.offset[2] == pytest.approx(60.0 * zero.is_known())
-    assert not plate_zero(plate, RATE_HZ).is_known()
+        unloaded = unloaded_samples(plate, RATE_HZ, flight=in_flight(recording, len(load)))
+        assert unloaded.any() == (seconds == 0.5 and ring_N == 0.0)
+        assert not unloaded.any() or zero_of(plate, unloaded)[2] == pytest.approx(60.0)
+    assert not unloaded_samples(plate, RATE_HZ).any()
 
 
 OFFSET = np.array([3.0, -2.0, 12.0, 0.5, -0.4, 0.1])
@@ -242,10 +248,10 @@ def _step() -> np.ndarray:
 
 def test_offset_is_found_and_subtracted():
     plate = _offset_plate(_step())
-    zero = plate_zero(plate, RATE_HZ)
-    assert 1500 < zero.n_samples < 2100 and len(zero.stretches_s) == 2
-    np.testing.assert_allclose(zero.offset, OFFSET, atol=0.3)
-    corrected, finding = subtract_zero(plate, zero)
+    unloaded = unloaded_samples(plate, RATE_HZ)
+    assert 1500 < unloaded.sum() < 2100 and len(runs(unloaded)) == 2
+    np.testing.assert_allclose(zero_of(plate, unloaded), OFFSET, atol=0.3)
+    corrected, finding = subtract_zero(plate, unloaded, RATE_HZ)
     assert finding.level == "corrected"
     assert abs(np.median(corrected.force_N[:900, 2])) < 0.3
 
@@ -258,9 +264,9 @@ def _silent_where(where: np.ndarray, plate: Plate) -> Plate:
 
 def test_zeros_that_software_wrote_are_no_reading():
     plate = _silent_where(_step() == 0, _offset_plate(_step()))
-    zero = plate_zero(plate, RATE_HZ)
-    assert not zero.is_known()
-    assert subtract_zero(plate, zero)[1].found.startswith("exactly 0 without load")
+    unloaded = unloaded_samples(plate, RATE_HZ)
+    assert not unloaded.any()
+    assert subtract_zero(plate, unloaded, RATE_HZ)[1].found.startswith("exactly 0 without load")
 
 
 def test_zeros_that_do_not_last_are_noise_about_a_threshold():
@@ -268,16 +274,17 @@ def test_zeros_that_do_not_last_are_noise_about_a_threshold():
     plate = _offset_plate(np.random.default_rng(5).normal(0, 5.0, 4000))
     low = np.abs(plate.force_N[:, 2]) < 9
     assert 0.15 < low.mean() < 0.5
-    zero = plate_zero(_silent_where(low, plate), RATE_HZ)
-    assert zero.n_samples > 3500
-    np.testing.assert_allclose(zero.offset[:3], OFFSET[:3], atol=2.5)
+    some = _silent_where(low, plate)
+    unloaded = unloaded_samples(some, RATE_HZ)
+    assert unloaded.sum() > 3500
+    np.testing.assert_allclose(zero_of(some, unloaded)[:3], OFFSET[:3], atol=2.5)
 
 
 def test_a_plate_that_is_never_unloaded_keeps_its_zero():
     plate = _offset_plate(np.full(3000, 350.0))
-    zero = plate_zero(plate, RATE_HZ)
-    assert not zero.is_known()
-    same, finding = subtract_zero(plate, zero)
+    unloaded = unloaded_samples(plate, RATE_HZ)
+    assert not unloaded.any()
+    same, finding = subtract_zero(plate, unloaded, RATE_HZ)
     assert same is plate and finding.level == "info"
 
 

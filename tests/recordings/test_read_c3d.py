@@ -11,7 +11,7 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plates import PlateDescription
+from bsip_cli.recordings.plates import CHANNELS_OF, PlateDescription
 from bsip_cli.recordings.read import open_recording, read_recording
 from tests.recordings.recording_writers import (
     CORNERS_M,
@@ -130,6 +130,57 @@ def test_header_and_parameters_that_disagree(tmp_path, what):
     recording = read_recording(_edited(tmp_path, (at, bytes([stated + 1]))))
     _check_wrench(recording)
     assert _levels(recording, "layout") == ["warning"]
+
+
+@pytest.mark.parametrize("stated", [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+def test_scales_that_call_floats_integers(tmp_path, stated):
+    """The header's, then the parameter's."""
+    at = _value_of(tmp_path, b"POINT", b"SCALE")
+    header, parameter = (np.float32(one).tobytes() for one in stated)
+    recording = read_recording(_edited(tmp_path, (12, header), (at, parameter)))
+    _check_wrench(recording)
+    assert _levels(recording, "scale") == ["corrected"] * (stated[0] > 0)
+
+
+def test_a_rate_that_two_others_contradict(tmp_path):
+    at = _value_of(tmp_path, b"POINT", b"RATE")
+    recording = read_recording(_edited(tmp_path, (at, np.float32(60).tobytes())))
+    _check_wrench(recording)
+    assert (recording.marker_rate_hz, recording.analog_rate_hz) == (100.0, 1000.0)
+    (said,) = (f.found for f in recording.findings if f.check == "rate")
+    assert "POINT:RATE says 60 Hz" in said
+
+
+@pytest.mark.parametrize(
+    ("kind", "table", "words"),
+    [
+        (2, lambda table: table - 1, "counted from 0"),
+        (3, lambda table: table - 1, "counted from 0"),
+        (1, lambda table: table.ravel().reshape(table.shape, order="F"), "by rows"),
+        (4, lambda table: table.T - 1, "a row for each plate and counted from 0"),
+    ],
+)
+@pytest.mark.parametrize("label", ["{axis}{plate}", "Force.{axis}{plate}"])
+def test_channels_that_are_listed_otherwise(tmp_path, kind, table, words, label):
+    """The labels of the channels tell how; without them the plates are left out, and it is said."""
+    path, spec = tmp_path / "a.c3d", _spec(kind=kind, origin_m=_origin(kind))
+    aside = replace(spec, corners_m=spec.corners_m + np.array([1.0, 0.0, 0.0]))
+    content = ezc3d.c3d(str(write_c3d(path, *standing_markers(N), [spec, aside])))
+    sound = read_recording(path)
+    listed = content["parameters"]["FORCE_PLATFORM"]["CHANNEL"]
+    listed["value"] = table(listed["value"][: len(CHANNELS_OF[kind])])
+    content.write(str(path))
+    unknown = read_recording(path)
+    content["parameters"]["ANALOG"]["LABELS"]["value"] = [
+        label.format(axis=axis, plate=plate) for plate in (1, 2) for axis in CHANNELS_OF[kind]
+    ]
+    content.write(str(path))
+    read = read_recording(path)
+    assert [words in f.found for f in read.findings if f.check == "plate"] == [True]
+    for one, other in zip(read.plates, sound.plates, strict=True):
+        np.testing.assert_allclose(one.moment_Nm, other.moment_Nm, atol=1e-3)
+    if "0" in words:
+        assert any("CHANNEL" in f.found for f in unknown.findings if f.check == "plate")
 
 
 def test_more_plates_are_described_than_used(tmp_path):

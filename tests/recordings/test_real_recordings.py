@@ -11,10 +11,8 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings import c3d_content
 from bsip_cli.recordings.c3d import open_c3d
 from bsip_cli.recordings.c3d_content import read_content
-from bsip_cli.recordings.c3d_format import numbers, texts
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_wrench import wrench_at_marker_rate
 from bsip_cli.recordings.plates import CHANNELS_OF
@@ -98,27 +96,6 @@ def test_the_same_samples_as_ezc3d(real_data):
         np.testing.assert_array_equal(own.analog.ravel(), theirs["analogs"].ravel())
         n_compared += 1
     assert n_compared >= 69  # data sets are added, none is taken away
-
-
-@pytest.mark.parametrize("folder", ["edge_c3dorg", "c3dorg_plate_types", "btk_functional_ll"])
-def test_a_copy_written_anew_holds_the_same_samples(real_data, folder, monkeypatch):
-    """Of every file, also of those that ezc3d reads rightly as they are."""
-    files = [path for path in _c3d_files(real_data / folder) if path.name not in REFUSED]
-    sound = {path: read_content(path) for path in files}
-    monkeypatch.setattr(c3d_content, "needs_mending", lambda *_: True)
-    for path, own in sound.items():
-        anew = read_content(path)
-        np.testing.assert_array_equal(anew.positions, own.positions)
-        np.testing.assert_allclose(anew.analog, own.analog, rtol=1e-6, atol=1e-9)
-        np.testing.assert_array_equal(anew.is_valid, own.is_valid)
-        for name in ("LABELS", "UNITS", "DESCRIPTIONS"):
-            assert texts(anew.group("ANALOG"), name) == texts(own.group("ANALOG"), name)
-        plates = {"CORNERS", "ORIGIN", "TYPE", "CHANNEL"} & own.group("FORCE_PLATFORM").keys()
-        for name in plates:
-            np.testing.assert_array_equal(
-                numbers(anew.group("FORCE_PLATFORM"), name),
-                numbers(own.group("FORCE_PLATFORM"), name),
-            )
 
 
 def _check_shapes(recording: Recording) -> None:

@@ -12,7 +12,7 @@ from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.hypothesis import Hypothesis
 from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
-from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, LocalWrench, measured, wrench_matrix
+from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
@@ -253,8 +253,8 @@ def _with_a_load(place_m: tuple[float, float], weight_N: float) -> list[C3dPlate
     axes = stated.rotation_lab_plate()
     force = np.tile([0.0, 0.0, weight_N], (len(one.measured), 1))
     moment = np.cross([*place_m, 0.0], force) + free_moment(force)
-    at_sensor = LocalWrench(force @ axes, moment @ axes).at_surface(-stated.origin_m)
-    channels = np.hstack([at_sensor.force_N, at_sensor.moment_Nm])
+    local = force @ axes
+    channels = np.hstack([local, moment @ axes - np.cross(local, stated.origin_m)])
     return [one, two, replace(one, description=stated, measured=channels)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator
@@ -32,7 +33,7 @@ from bsip_cli.recordings.text_tables import (
     text_lines,
     without_end,
 )
-from bsip_cli.recordings.units import force_in_N
+from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
@@ -172,25 +173,44 @@ def _numbers(cells: list[str], path: Path) -> list[float]:
 
 # --- what the columns mean ------------------------------------------------------------------------
 
-# Words, then an axis with or without the letter of its quantity (vx, Fx, px, x), then what is left.
+# Parts of a column's name, in whatever order and without accents, in English, German, Spanish,
+# French, Italian and Portuguese; what is left of it names the plate.
 _WORDS = {
-    **dict.fromkeys(("force", "forces", "grf", "grfs"), "force"),
-    **dict.fromkeys(("cop", "pressure", "point", "position"), "point"),
-    **dict.fromkeys(("moment", "moments", "grm"), "moment"),
-    **dict.fromkeys(("torque", "torques"), "torque"),
-    **dict.fromkeys(("left", "right"), "side"),
-    **dict.fromkeys(("ground", "reaction", "plate", "platform", "external", "free"), ""),
-    **dict.fromkeys(("centre", "center", "application", "applied"), ""),
+    word: meaning
+    for meaning, words in {
+        "force": "force forces grf grfs kraft krafte kraefte fuerza fuerzas forza forze forca forcas",
+        "point": "cop pressure point position druckpunkt druckmittelpunkt angriffspunkt punto ponto "
+        "presion pression pressione pressao posicion posizione posicao",
+        "moment": "moment moments grm momente drehmoment drehmomente momento momentos momenti",
+        "torque": "torque torques couple coppia",
+        "side": "left right links rechts izquierda derecha gauche droite sinistra destra esquerda "
+        "direita",
+        "ground": "ground boden suelo suolo",
+        "": "reaction reaktion reaktions reaccion reazione reacao plate platform platte plattform "
+        "messplatte plateforme plaque plataforma piattaforma pedana external externa esterna free "
+        "freies libre libero livre centre center centro application applied applicazione "
+        "aplicacion aplicacao",
+    }.items()
+    for word in words.split()
 }
+# Other words hold these too, as forearm does: they stand alone, or before an axis.
+_SHORT = {"for": "force", "mom": "moment", "cdp": "point"}
+_MEANINGS = _WORDS | _SHORT | {"fp": "ground"}
+_LINKS = "of|de|di|do|da|du|des|del|della|le|la|der|am|sol|solo|axis|eje|axe|achse|asse|eixo"
+_LINKS += "|(?:d|l|dell)(?=['\N{RIGHT SINGLE QUOTATION MARK}])"
 _LETTERS = {"v": "force", "f": "force", "p": "point", "c": "point", "m": "moment", "t": "torque"}
+# An axis comes with or without the letter of its quantity (vx, Fx, px, x).
 _KNOWN = "|".join(sorted(_WORDS, key=len, reverse=True))
-_AXIS = r"[vfpcmt]?[xyz](?=[lr]?(?![a-z]))"
+_AXIS = rf"(?:[vfpcmt]?[xyz](?=[lr]?(?![a-z]))|(?<![a-z])[xyz](?={_KNOWN}))"
 _TOKEN = re.compile(
-    rf"(?P<word>{_KNOWN}|fp(?![a-z]))|(?:(?<![a-z])of(?![a-z]))|(?P<number>\d+)|(?P<axis>{_AXIS})"
+    rf"(?P<word>{_KNOWN}|fp(?![a-z])|(?<![a-z])(?:{'|'.join(_SHORT)})(?=[xyz]?(?![a-z])))"
+    rf"|(?<![a-z])(?:{_LINKS})(?![a-z])|(?P<number>\d+)|(?P<axis>{_AXIS})"
     rf"|(?P<other>[lr](?={_AXIS})|[a-z]+?(?={_KNOWN}|{_AXIS}|[^a-z]|$))"
 )
+_PRESSURE_PLATE = re.compile(r"pressure(?=[\W_]*plat)")  # says nothing of points
 _JOINT_REACTION = re.compile(r"_on_.+_in_")  # OpenSim's: body_on_body_in_frame
-_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+_BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_PLATE = re.compile(r"[^\W\d]*[\W_]*\d{1,2}|[lrgdise]", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -200,7 +220,7 @@ class Meaning:
     plate: str  # "" where the name says none
     quantity: str  # force, point, moment, torque
     axis: str  # x, y, z
-    unit: str  # in brackets behind the name, "" without
+    unit: str  # in brackets, "" without
 
 
 def meaning_of(name: str) -> Meaning | None:
@@ -209,25 +229,38 @@ def meaning_of(name: str) -> Meaning | None:
     None for a name with no axis, with two, or with no word or letter for a quantity, and for the
     force between two bodies.
     """
-    unit = _UNIT.search(name)
-    tokens = list(_TOKEN.finditer(_UNIT.sub("", name).lower()))
+    name, unit = _without_unit(name)
+    letters = unicodedata.normalize("NFKD", name.lower())
+    plain = _PRESSURE_PLATE.sub("", "".join(x for x in letters if not unicodedata.combining(x)))
+    tokens = list(_TOKEN.finditer(plain))
     axes = [token["axis"] for token in tokens if token["axis"]]
-    if len(axes) != 1 or _JOINT_REACTION.search(name.lower()):
+    if len(axes) != 1 or _JOINT_REACTION.search(plain):
         return None
-    words = [token["word"] for token in tokens if token["word"]]
-    said = [quantity for word in words if (quantity := _WORDS.get(word, "")) not in ("", "side")]
-    plate = [name for token in tokens if (name := token["number"] or token["other"])]
-    plate += [word[0] for word in words if _WORDS.get(word) == "side"]
+    said = [_MEANINGS[token["word"]] for token in tokens if token["word"]]
+    plate = [part for token in tokens if (part := token["number"] or token["other"])]
+    plate += [word[0] for token in tokens if _MEANINGS.get(word := token["word"]) == "side"]
     letter = axes[0][:-1]
-    if letter == "v" and "force" not in said and not {"ground", "fp"} & set(words):
+    if letter == "v" and not {"force", "ground"} & set(said):
         return None  # a velocity
-    quantity = _LETTERS[letter] if letter else said[-1] if said else ""
+    quantities = [one for one in said if one in _LETTERS.values()]
+    # The centre of pressure of a force, the moment on a force plate.
+    quantities = [one for one in quantities if one != "force"] or quantities
+    quantity = _LETTERS[letter] if letter else quantities[-1] if quantities else ""
     if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):
         plate.remove(alone)  # F1_x
         quantity = _LETTERS[alone]
-    if not quantity:
-        return None
-    return Meaning("".join(plate), quantity, axes[0][-1], unit[1].strip() if unit else "")
+    return Meaning("".join(plate), quantity, axes[0][-1], unit) if quantity else None
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    """A name and the unit in its brackets: what stands at its end and is no plate, or is known."""
+    for bracket in _BRACKET.finditer(name):
+        inside = bracket[1].strip()
+        is_known = any(size(inside) for size in (length_in_m, force_in_N, moment_in_Nm))
+        is_last = not name[bracket.end() :].strip()
+        if is_known or (is_last and not _PLATE.fullmatch(inside)):
+            return f"{name[: bracket.start()]} {name[bracket.end() :]}".strip(), inside
+    return name, ""
 
 
 def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Finding]]:

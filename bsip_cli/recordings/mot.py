@@ -178,9 +178,10 @@ def _numbers(cells: list[str], path: Path) -> list[float]:
 _WORDS = {
     word: meaning
     for meaning, words in {
-        "force": "force forces grf grfs kraft krafte kraefte fuerza fuerzas forza forze forca forcas",
-        "point": "cop pressure point position druckpunkt druckmittelpunkt angriffspunkt punto ponto "
-        "presion pression pressione pressao posicion posizione posicao",
+        "force": "force forces grf grfs kraft krafte kraefte fuerza fuerzas forza forze forca "
+        "forcas",
+        "point": "cop pressure point position druckpunkt druckmittelpunkt angriffspunkt punto "
+        "ponto presion pression pressione pressao posicion posizione posicao",
         "moment": "moment moments grm momente drehmoment drehmomente momento momentos momenti",
         "torque": "torque torques couple coppia",
         "side": "left right links rechts izquierda derecha gauche droite sinistra destra esquerda "

@@ -303,7 +303,7 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
-def later_samples(n: int, by: int) -> tuple[np.ndarray, np.ndarray]:
+def later_samples(n: int, by: int | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ``by``-th after each of n samples, the nearest one where there is none, and where."""
     samples = np.arange(n) + by
     return samples.clip(0, n - 1), (samples >= 0) & (samples < n)
@@ -369,24 +369,30 @@ def averaged(values: np.ndarray, usable: np.ndarray, sigma: float) -> np.ndarray
 # --- plates that are copies or sums of others, as treadmills and virtual plates export them -------
 
 
-def repeated_plates(trials: Sequence[Mapping[str, PlateSource]]) -> dict[str, tuple[str, ...]]:
+def repeated_plates(
+    trials: Sequence[Mapping[str, PlateSource]], smooth: Sequence[Mapping[str, PlateSource]]
+) -> dict[str, tuple[str, ...]]:
     """Names of plates whose force is that of another, or the sum of others, in every trial: as
-    large, or at the same place.
+    large, or, averaged by a bell (``smooth``), at the same place.
 
     Fewer terms are tried first, so that each is needed; of two copies the later one repeats. Forces
     push, whichever way the plate lies and its signs are.
     """
     repeated: dict[str, tuple[str, ...]] = {}
-    wrenches = [{name: _pushing(source) for name, source in trial.items()} for trial in trials]
+    wrenches, averaged_ = (
+        [{name: _pushing(source) for name, source in trial.items()} for trial in some]
+        for some in (trials, smooth)
+    )
     floors_m = {name: source.floor_m() for trial in trials for name, source in trial.items()}
     names = list(floors_m)
     for name in reversed(names):
         others = [n for n in names if n != name and n not in repeated]
         earlier = [n for n in others if names.index(n) < names.index(name)]
-        for is_sum in (_is_as_large, partial(_is_at_place, floor_m=floors_m[name])):
+        at_place = partial(_is_at_place, floor_m=floors_m[name])
+        for seen, is_sum in ((wrenches, _is_as_large), (averaged_, at_place)):
             sums = (combinations(others, n) for n in range(2, min(len(others), _MOST_TERMS) + 1))
             possible = chain(combinations(earlier, 1), *sums)
-            found = (some for some in possible if is_sum(*_own_and_sum(wrenches, name, some)))
+            found = (some for some in possible if is_sum(*_own_and_sum(seen, name, some)))
             if name not in repeated and (terms := next(found, None)) is not None:
                 repeated[name] = terms
     return repeated

@@ -45,6 +45,9 @@ sees it along the simulation."""
 _MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
 _NEAR_S = 0.1  # lags so near are one
+# Of a clock that runs otherwise, or of a table that lost rows and was numbered anew: what forces
+# come later or earlier by at a trial's end, up to that share of it (more is another rate, `PACES`).
+_DRIFT_STEP_S, _MOST_DRIFT_S, _DRIFT_SHARE = 0.1, 2.0, 0.15
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,8 @@ class Lags:
     """How well forces go with the body if they are taken from later, logarithm, (n,) each: as the
     file says; the force alone, turned or mirrored as suits it best; and the lift alone, which no
     unit, reference point or order of corners changes. kept : see `Delay`. ``path_m`` : of the
-    centre of mass in each step."""
+    centre of mass in each step. ``drift_s`` : by what forces surely come later at the trial's end
+    than at its start, where they come with the motion; 0 if that is not sure."""
 
     seconds: np.ndarray
     kept: np.ndarray
@@ -77,6 +81,7 @@ class Lags:
     of_force: np.ndarray
     of_lift: np.ndarray
     path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    drift_s: float = 0.0
 
     def steps_s(self) -> np.ndarray:
         """When the centre of mass is where the path has it, (m,)."""
@@ -149,7 +154,26 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     by = np.arange(-most, most + 1)
     found = [_goes(body, total, k, limits) for k in by.tolist()]
     kept, as_stated, of_force, of_lift = np.array(found).T
-    return Lags(by * step / rate_hz, kept, as_stated, of_force, of_lift, body.place_m)
+    drift_s = _drift_s(body, total, step / rate_hz, float(of_force.max()), limits)
+    return Lags(by * step / rate_hz, kept, as_stated, of_force, of_lift, body.place_m, drift_s)
+
+
+def _drift_s(
+    body: Body, total: np.ndarray, step_s: float, of_delays: float, limits: GateLimits
+) -> float:
+    """As `Lags` has it, of what goes with the body by ``of_delays`` at the best of all lags."""
+    steps = np.arange(len(total))
+    most_s = min(_MOST_DRIFT_S, _DRIFT_SHARE * len(total) * step_s)
+    sizes_s = _DRIFT_STEP_S * np.arange(1, int(most_s / _DRIFT_STEP_S) + 1)
+    drifts_s = [*-sizes_s[::-1], *sizes_s]
+    if not drifts_s:
+        return 0.0
+    by = (np.round(drift / step_s * steps / len(total)).astype(int) for drift in drifts_s)
+    goes = np.array([_goes(body, total, one, limits)[2] for one in by])
+    rare = DELAYED - np.log(len(goes))
+    surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
+    best = int(np.argmax(goes))
+    return float(drifts_s[best]) if goes[best] + rare > of_delays + surely else 0.0
 
 
 def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
@@ -162,18 +186,19 @@ def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict
     samples = np.round(frames * analog_hz / rate_hz).astype(int)
     samples = samples[samples < min(len(source.usable) for source in opened.sources)]
     wrenches = {}
-    repeated = repeated_plates([{one.name: one for one in opened.sources}])
-    for source in opened.sources:
-        if source.name in repeated:
-            continue
-        parts = source.smoothed(SMOOTH_S * analog_hz).at(samples).parts()
-        wrenches[source.name] = parts @ source.matrix(AS_STATED).T
+    smooth = {one.name: one.smoothed(SMOOTH_S * analog_hz) for one in opened.sources}
+    repeated = repeated_plates([{one.name: one for one in opened.sources}], [smooth])
+    for name, source in smooth.items():
+        if name not in repeated:
+            wrenches[name] = source.at(samples).parts() @ source.matrix(AS_STATED).T
     body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
     return body, samples, wrenches
 
 
-def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, ...]:
-    """As `Lags` has it from ``kept`` on."""
+def _goes(
+    body: Body, total: np.ndarray, by: int | np.ndarray, limits: GateLimits
+) -> tuple[float, ...]:
+    """As `Lags` has it from ``kept`` on, each row's force from ``by`` rows later."""
     rows, there = later_samples(len(total), by)
     later = np.where(there[:, None], total[rows], np.nan)
     kept = float(np.isfinite(later).all(axis=1).mean())
@@ -227,7 +252,8 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be. ``course`` and ``sizes`` : to compare it with others.
+    another ``delay``, of each that may be. ``drift_s`` : see `Lags`. ``course`` and ``sizes`` : to
+    compare it with others.
     """
 
     name: str
@@ -244,6 +270,7 @@ class TrialSamples:
     mass_kg: float = 0.0
     delay: Delay = NO_DELAY
     late: tuple[TrialSamples, ...] = ()
+    drift_s: float = 0.0
     course: Course = field(default_factory=Course)
     sizes: Sizes = field(default_factory=dict)
 
@@ -257,7 +284,7 @@ class TrialSamples:
             return replace(stated, course=Course.of(opened)) if stated.sources else stated
         none, *others = found.delays(limits)
         course = Course.of(opened, found.steps_s(), found.path_m, found.goes())
-        stated = replace(stated, course=course)
+        stated = replace(stated, course=course, drift_s=found.drift_s)
         late = (
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others

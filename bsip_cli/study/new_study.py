@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -368,9 +368,3 @@ def words(text: str) -> list[str]:
     split = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", folded)
     whole = re.findall(r"[A-Za-z]+", folded)
     return list(dict.fromkeys(word.lower() for word in (*split, *whole)))
-
-
-def counted(names: Iterable[str]) -> str:
-    """``3 .avi, 1 .vsk``: how many of each kind."""
-    counts = Counter(names)
-    return ", ".join(f"{n} {kind}" for kind, n in sorted(counts.items(), key=lambda p: -p[1]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,11 +11,11 @@ from pathlib import Path
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_bytes
-from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.folders import check_path, entries, is_folder, lies_in
 from bsip_cli.files.regular import fault_of
 from bsip_cli.study.participants import NAME, Participant, Row, participant_of, read_people, rows_of
-from bsip_cli.study.trials import RECORDINGS, Fault, Role, Trial, find_trials, listed, refusals_of
+from bsip_cli.study.trials import RECORDINGS, Role, Trial, find_trials, kinds, listed, merged
 
 __all__ = ["Participant", "Role", "Study", "Trial", "describe_dataset", "load_study", "make_out"]
 
@@ -107,10 +106,16 @@ class _Loading:
         except BadDataError as closed:
             self.refusals.append(closed)
             return
-        expected, remedy = "recordings in the folders of participants", "move it there"
-        outside = [path for path in paths if path.suffix.lower() in RECORDINGS]
-        found = "lies in no participant's folder"
-        self.refusals += refusals_of(Fault(path, found, expected, remedy) for path in outside)
+        self.refusals += merged(
+            BadDataError(
+                "lies in no participant's folder",
+                file=path,
+                expected="recordings in the folders of participants",
+                remedy="move it there",
+            )
+            for path in paths
+            if path.suffix.lower() in RECORDINGS
+        )
         unnamed = [path for path in paths if NAME.fullmatch(path.name) and path.name not in named]
         if unnamed:
             table = self.root / "participants.tsv"
@@ -127,11 +132,11 @@ class _Loading:
                 f"sub-XX/ses-YY: {_where(folders, self.root)}"
             )
         if files:
-            yield f"files that are no recordings and not used: {_kinds(files, self.root)}"
+            yield f"files that are no recordings and not used: {_told(files, self.root)}"
         if self.spare_forces:
             yield (
                 "forces that are not used, since those of the C3D of their name are: "
-                f"{_kinds(self.spare_forces, self.root)}"
+                f"{_told(self.spare_forces, self.root)}"
             )
 
 
@@ -148,12 +153,8 @@ def _check_folder(root: Path, name: str) -> None:
     )
 
 
-def _kinds(files: Sequence[Path], root: Path) -> str:
-    """Where a few files lie; of more, how many there are of each kind."""
-    if len(files) <= _FEW:
-        return _where(files, root)
-    counts = Counter(path.suffix.lower() or "without an ending" for path in files)
-    return ", ".join(f"{n} {printable(kind)}" for kind, n in counts.most_common())
+def _told(files: Sequence[Path], root: Path) -> str:
+    return _where(files, root) if len(files) <= _FEW else kinds(files)
 
 
 def _where(paths: Sequence[Path], root: Path) -> str:

@@ -25,12 +25,12 @@ from bsip_cli.recordings.text_tables import (
     check_names,
     dialect_of,
     head_of,
-    is_missing,
     number,
     parted,
     row_counts,
     separator_of,
     text_lines,
+    values_of,
     without_end,
 )
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
@@ -149,8 +149,13 @@ def _values(
         if len(cells) != n_columns:
             short = len(cells)
             continue
+        row_values, words = values_of(cells)
+        if words:
+            found = f"its table cannot be read: '{printable(words[0][:40])}' is no number"
+            expected = "numbers, and empty cells or nan where one is missing"
+            raise refusal(path, found, expected, _AGAIN)
         digits.add(cells[0])
-        values.extend(_numbers(cells, path))
+        values.extend(row_values)
     is_cut = 0 < short < n_columns and len(values) > 0 and not goes_on
     if short and not is_cut:
         expected = f"{n_columns}, as many as there are columns"
@@ -158,17 +163,6 @@ def _values(
     table = np.array(values).reshape(-1, n_columns)
     table[~np.isfinite(table)] = np.nan
     return table, digits, is_cut
-
-
-def _numbers(cells: list[str], path: Path) -> list[float]:
-    try:
-        return list(map(float, cells))
-    except ValueError:
-        word = next((c for c in cells if not is_missing(c) and np.isnan(number(c))), "")
-    if word:
-        found = f"its table cannot be read: '{printable(word[:40])}' is no number"
-        raise refusal(path, found, "numbers, and empty cells or nan where one is missing", _AGAIN)
-    return list(map(number, cells))
 
 
 # --- what the columns mean ------------------------------------------------------------------------
@@ -283,11 +277,11 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
         found = "no ground force among the columns " + ", ".join(table.names[:8])
         remedy = f"rename the columns or {_AGAIN}"
         raise refusal(path, found, "columns like ground_force_1_vx", remedy)
-    used = {0}
-    forces = tuple(
-        _force(str(k + 1), plate, columns, table, used, path)
-        for k, (plate, columns) in enumerate(plates.items())
-    )
+    forces, used = [], {0}
+    for k, (plate, of_plate) in enumerate(plates.items()):
+        columns = _columns_of(plate or str(k + 1), of_plate, table, path)
+        forces.append(_force(str(k + 1), columns, table, path))
+        used.update(chain(*columns.values()))
     largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
     for force in forces:  # a missing point or moment of no force is zero
         idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
@@ -302,7 +296,7 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     found = f"{len(unknown)} columns of the forces that are not understood: {told}{more}"
     expected = "force, point and moment of each plate, by axis"
     about = Finding("columns", "", found, expected, "left them out", "info")
-    return forces, [about] if unknown else []
+    return tuple(forces), [about] if unknown else []
 
 
 def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) -> None:
@@ -316,43 +310,42 @@ def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) ->
         values[here] = values[np.where(is_nearer, rows[before], rows[after])]
 
 
-def _force(
-    name: str,
-    plate: str,
-    columns: dict[str, dict[str, int]],
-    table: _Table,
-    used: set[int],
-    path: Path,
-) -> GroundForce:
-    """One plate's columns, by quantity and axis; marks them in ``used``."""
+def _columns_of(
+    plate: str, columns: dict[str, dict[str, int]], table: _Table, path: Path
+) -> dict[str, list[int]]:
+    """Of force, point and moment, as far as a plate has them, the columns x, y and z.
+
+    Of moments and torques it is these beside a point: free ones.
+    """
     for quantity, axes in columns.items():
         if len(axes) < 3:
             column = printable(table.names[next(iter(axes.values()))])
             found = (
                 f"only {' and '.join(sorted(axes))} of the {quantity} of plate "
-                f"'{printable(plate) or name}' (column '{column}')"
+                f"'{printable(plate)}' (column '{column}')"
             )
             remedy = (
                 "export all three, or add a column of zeros where it is zero by definition "
                 "(the height of a point on the floor, a torque about a level axis)"
             )
             raise refusal(path, found, "columns for x, y and z", remedy)
-    by_quantity = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
-    force, point = by_quantity["force"], by_quantity.get("point")
-    one, other = by_quantity.get("torque"), by_quantity.get("moment")
-    moment = one or other if point else other or one
-    used.update(force, point or (), moment or ())
-    unit = table.unit(force[0])
-    size = force_in_N(unit) if unit else 1.0
-    moments = table.values[:, moment] * table.force_N if moment else None
+    found = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
+    moments = [found.pop(name) for name in ("torque", "moment") if name in found]
+    return found | ({"moment": moments[0 if "point" in found else -1]} if moments else {})
+
+
+def _force(name: str, columns: dict[str, list[int]], table: _Table, path: Path) -> GroundForce:
+    values = {quantity: table.values[:, own] for quantity, own in columns.items()}
+    units = {quantity: table.unit(own[0]) for quantity, own in columns.items()}
+    size = force_in_N(units["force"]) if units["force"] else 1.0
     if size is None:
-        found, remedy = f"forces in '{printable(unit[:20])}'", "export the forces in N"
+        found, remedy = f"forces in '{printable(units['force'][:20])}'", "export the forces in N"
         raise refusal(path, found, "N or kN", remedy)
     return GroundForce(
         name,
-        table.values[:, force] * size * table.force_N,
-        table.values[:, point] if point else None,
-        moments,
-        table.unit(point[0]) if point else "",
-        table.unit(moment[0]) if moment else "",
+        values["force"] * size * table.force_N,
+        values.get("point"),
+        values["moment"] * table.force_N if "moment" in values else None,
+        units.get("point", ""),
+        units.get("moment", ""),
     )

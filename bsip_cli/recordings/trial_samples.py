@@ -44,6 +44,8 @@ sees it along the simulation."""
 
 _MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
+# Logarithm, of one step of lags a second away: tenths of a second are as frequent as whole ones.
+_LOG_PRIOR = DELAYED + float(np.log(_STEP_S / 2 / np.log(_MOST_S / LEAST_S)))
 _NEAR_S = 0.1  # lags so near are one
 # Of a clock that runs otherwise, or of a table that lost rows and was numbered anew: what forces
 # come later or earlier by at a trial's end, up to that share of it (more is another rate, `PACES`).
@@ -62,9 +64,6 @@ class Delay:
     def limits(self, usual: GateLimits) -> GateLimits:
         """A part of a trial counts as so many independent numbers less."""
         return replace(usual, independent_numbers=self.kept * usual.independent_numbers)
-
-
-NO_DELAY = Delay()
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +86,14 @@ class Lags:
         """When the centre of mass is where the path has it, (m,)."""
         return (self.seconds[1] - self.seconds[0]) * np.arange(len(self.path_m))
 
-    def _now(self) -> np.ndarray:
-        """(3,) of each kind at the stated times, nearly."""
-        every = np.array([self.as_stated, self.of_force, self.of_lift])
-        return np.asarray(every[:, np.abs(self.seconds) <= LEAST_S].max(axis=1).clip(min=0.0))
+    def _now(self, kind: np.ndarray) -> np.ndarray:
+        """Of a kind (..., n) at the stated times, nearly, (...,)."""
+        now = np.abs(self.seconds) <= LEAST_S
+        return np.asarray(kind[..., now].max(axis=-1).clip(min=0.0))
 
     def goes(self) -> float:
         """How well forces go with the body at the stated times, in whatever axes and units."""
-        return float(self._now()[1])
+        return float(self._now(self.of_force))
 
     def delays(self, limits: GateLimits = USUAL) -> list[Delay]:
         """None, and all that are not surely others if any surely is better: who moves in cycles
@@ -104,7 +103,7 @@ class Lags:
         surely = -float(np.log(1 - limits.corrected_percent / 100))
         every = np.array([self.as_stated, self.of_force, self.of_lift])
         highest = every.max(axis=1)
-        if not (highest > self._now() + surely).any():
+        if not (highest > self._now(every) + surely).any():
             return [none]
         least = (highest - surely).clip(min=surely)[:, None]
         may_be, likelier = (every >= least).any(axis=0), every[:2].max(axis=0)
@@ -115,14 +114,9 @@ class Lags:
             aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
             delay_s = float(self.seconds[k] + aside * (self.seconds[k + 1] - self.seconds[k]))
             if may_be[k] and abs(delay_s) > LEAST_S:
-                found.append(Delay(delay_s, self.kept[k], _log_prior(delay_s) + self.of_lift[k]))
+                rare = _LOG_PRIOR - float(np.log(abs(delay_s)))
+                found.append(Delay(delay_s, self.kept[k], rare + self.of_lift[k]))
         return found
-
-
-def _log_prior(delay_s: float) -> float:
-    """Of one step of lags there: tenths of a second are as frequent as whole ones."""
-    both_ways = 2 * float(np.log(_MOST_S / LEAST_S))
-    return DELAYED + float(np.log(_STEP_S / abs(delay_s) / both_ways))
 
 
 def surest(logs: Mapping[Delay, float], of_none: float, limits: GateLimits) -> Delay | None:
@@ -268,7 +262,7 @@ class TrialSamples:
     body: Body
     lengths: Lengths | None = None
     mass_kg: float = 0.0
-    delay: Delay = NO_DELAY
+    delay: Delay = Delay()
     late: tuple[TrialSamples, ...] = ()
     drift_s: float = 0.0
     course: Course = field(default_factory=Course)
@@ -276,20 +270,29 @@ class TrialSamples:
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
-        stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
         recording = opened.recording
-        stated = replace(stated, sizes=sizes_of(recording.labels, recording.markers_m))
-        found = lags(opened, limits) if stated.sources else None
-        if found is None:
-            return replace(stated, course=Course.of(opened)) if stated.sources else stated
+        stated = replace(
+            cls._of(opened),
+            lengths=opened.lengths,
+            mass_kg=_mass_kg(opened),
+            sizes=sizes_of(recording.labels, recording.markers_m),
+        )
+        if not stated.sources:
+            return stated
+        if (found := lags(opened, limits)) is None:
+            return replace(stated, course=Course.of(opened))
         none, *others = found.delays(limits)
-        course = Course.of(opened, found.steps_s(), found.path_m, found.goes())
-        stated = replace(stated, course=course, drift_s=found.drift_s)
         late = (
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others
         )
-        return replace(stated, delay=none, late=tuple(one for one in late if one.sources))
+        return replace(
+            stated,
+            course=Course.of(opened, found.steps_s(), found.path_m, found.goes()),
+            drift_s=found.drift_s,
+            delay=none,
+            late=tuple(one for one in late if one.sources),
+        )
 
     @classmethod
     def _of(cls, opened: Opened) -> TrialSamples:

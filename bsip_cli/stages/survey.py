@@ -33,7 +33,7 @@ from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
-_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others", "twins", "odd")
+_OF_TRIALS = ("delays_s", "drifts_s", "paces", "maybe_paces", "of_others", "twins", "odd")
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
 _NO_TEST = "what is found in one is no test of the other; remove one of them"

@@ -16,30 +16,34 @@ STILL_M_S = 0.1
 """Mean speed of markers over half a second: people who stand sway by centimetres a second, in slow
 movements the limbs go several times faster."""
 
-_STATIC_NAMES = (
+
+def _set_of(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+_STATIC = _set_of(
     "static statics statisch statique estatico estatica statico statica calib calibration kalib "
     "kalibrierung kalibration calibracion calibrazione calibracao neutral neutre neutro tpose "
     "npose apose anatomical anatomic scal"
 )
 # Words that movements have too, as in sit to stand: these must be still nearly all the time.
-_PERHAPS_STATIC_NAMES = "cal st pose stand standing stehen debout anat reference ref"
-_SEQUENCE_NAMES = "sequence sequenz identification identify excitation"
+_PERHAPS_STATIC = _set_of("cal st pose stand standing stehen debout anat reference ref")
+_SEQUENCE = _set_of("sequence sequenz identification identify excitation")
 # Folders that sort recordings, and name nobody.
-_SORTING_NAMES = (
-    "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
-    "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
-    "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
-    "inputs input output condition cond block task tasks"
+_SORTING = (
+    _STATIC
+    | _PERHAPS_STATIC
+    | _set_of(
+        "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
+        "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
+        "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
+        "inputs input output condition cond block task tasks"
+    )
 )
-_PERSON_NAMES = (
+_PERSONS = _set_of(
     "s sub subj subject p part participant pat patient pt vp pp proband probandid id sujet "
     "sujeto soggetto sbj hc"
 )
-_STATIC, _PERHAPS_STATIC, _SEQUENCE, _PERSONS = (
-    frozenset(names.split())
-    for names in (_STATIC_NAMES, _PERHAPS_STATIC_NAMES, _SEQUENCE_NAMES, _PERSON_NAMES)
-)
-_SORTING = frozenset(_SORTING_NAMES.split()) | _STATIC | _PERHAPS_STATIC
 _LONGEST_TASK = 40  # letters
 _LONGEST_RUN = 4  # digits; longer ones are dates and belong to the name
 _ENOUGH_LABELS = 0.5  # shared, of the recording with fewer: else nothing says that it is one set

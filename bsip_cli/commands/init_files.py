@@ -179,15 +179,7 @@ def trial_words(path: Path) -> tuple[str, ...]:
 def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Source:
     forces = None
     if one.kind == ".trc":
-        # tables of its name, from the nearest folder that has one, which no other TRC has
-        tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
-        own = [table for table in tables if _markers_of(table, files) == [one]]
-        is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
-        if not tables and is_alone:  # a file was given, and not the folder
-            nearby = (Listed(path, one.folders) for path in entries(one.path.parent))
-            own = _nearest(one, (file for file in nearby if file.kind in ENDINGS))
-        paths = sorted(file.path for file in own)
-        recording, forces = _with_forces(one, _tables(paths, unused), unused)
+        recording, forces = _with_forces(one, _tables_of(one, files, unused), unused)
     else:
         recording = read_recording(one.path)
     bare = [label.rpartition(":")[2].strip() for label in recording.labels]
@@ -207,10 +199,18 @@ def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Sourc
     return Source(*found, forces, recording.stated, written)
 
 
-def _tables(paths: Sequence[Path], unused: list[Unused]) -> list[Path]:
-    """Those that hold forces, where several have the trial's name."""
+def _tables_of(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> list[Path]:
+    """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has; where
+    there are several, those that hold forces."""
+    tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
+    own = [table for table in tables if _markers_of(table, files) == [one]]
+    is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
+    if not tables and is_alone:  # a file was given, and not the folder
+        nearby = (Listed(path, one.folders) for path in entries(one.path.parent))
+        own = _nearest(one, (file for file in nearby if file.kind in ENDINGS))
+    paths = sorted(file.path for file in own)
     if len(paths) < 2:
-        return list(paths)
+        return paths
     forces = []
     for path in paths:
         try:

@@ -7,9 +7,10 @@ import unicodedata
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,15 +71,13 @@ class _Table:
     time_digits: LastDigit
     is_cut: bool
     dialect: Dialect
-    force_N: float = 1.0  # what a force of 1 is, in the unit of its column
+    force_N: float  # what a force of 1 is, in the unit of its column
 
     def unit(self, column: int) -> str:
         """In brackets behind the column's name, else in the row of units."""
-        if (meaning := meaning_of(self.names[column])) is not None and meaning.unit:
-            return meaning.unit
         if column == 0 and (bracket := re.search(r"[\[(_]([^\[\]()]+)[\])]?$", self.names[0])):
             return bracket[1]
-        return self.units[column].strip("[]() ")
+        return _without_unit(self.names[column])[1] or self.units[column].strip("[]() ")
 
 
 def read_mot(path: Path, force_N: float = 1.0) -> Mot:
@@ -91,7 +90,7 @@ def read_mot(path: Path, force_N: float = 1.0) -> Mot:
     first = end if end and _names(end) else next((line for line in lines if line.strip()), "")
     if end is None or not first:
         raise _no_table(path)
-    table = replace(_read_table(lines, first, path), force_N=force_N)
+    table = _read_table(lines, first, path, force_N)
     stated = next((float(m[1]) for line in header if (m := _ROWS.match(line.strip()))), np.nan)
     findings = row_counts("rows of forces", stated, len(table.values))
     if table.is_cut:
@@ -114,7 +113,7 @@ def _no_table(path: Path) -> BadDataError:
     return refusal(path, "no table after 'endheader'", "a MOT file", _AGAIN)
 
 
-def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
+def _read_table(lines: Iterator[str], first: str, path: Path, force_N: float) -> _Table:
     """The table below the line of names, which may be parted otherwise than its rows."""
     mark = separator_of(first)
     check_names(parted(first, mark), "columns", path)
@@ -132,7 +131,7 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
     said = parted(units, separator_of(units))
     values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
     units_of = said if len(said) == len(names) else [""] * len(names)
-    return _Table(names, units_of, values, digits, is_cut, dialect)
+    return _Table(names, units_of, values, digits, is_cut, dialect, force_N)
 
 
 def _values(
@@ -208,14 +207,12 @@ _BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 _PLATE = re.compile(r"[^\W\d]*[\W_]*\d{1,2}|[lrgdise]", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class Meaning:
+class Meaning(NamedTuple):
     """What one column holds."""
 
     plate: str  # "" where the name says none
     quantity: str  # force, point, moment, torque
     axis: str  # x, y, z
-    unit: str  # in brackets, "" without
 
 
 def meaning_of(name: str) -> Meaning | None:
@@ -224,8 +221,7 @@ def meaning_of(name: str) -> Meaning | None:
     None for a name with no axis, with two, or with no word or letter for a quantity, and for the
     force between two bodies.
     """
-    name, unit = _without_unit(name)
-    letters = unicodedata.normalize("NFKD", name.lower())
+    letters = unicodedata.normalize("NFKD", _without_unit(name)[0].lower())
     plain = _PRESSURE_PLATE.sub("", "".join(x for x in letters if not unicodedata.combining(x)))
     tokens = list(_TOKEN.finditer(plain))
     axes = [token["axis"] for token in tokens if token["axis"]]
@@ -244,7 +240,7 @@ def meaning_of(name: str) -> Meaning | None:
     if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):
         plate.remove(alone)  # F1_x
         quantity = _LETTERS[alone]
-    return Meaning("".join(plate), quantity, axes[0][-1], unit) if quantity else None
+    return Meaning("".join(plate), quantity, axes[0][-1]) if quantity else None
 
 
 def _without_unit(name: str) -> tuple[str, str]:

@@ -255,10 +255,7 @@ class Grid:
     def from_time(self, first_s: float) -> Grid:
         """The same, beginning at another time."""
         shift_s = first_s - self.time_s[0]
-        samples_s = self.samples_s + shift_s
-        is_even = self.samples_s is self.time_s
-        time_s = samples_s if is_even else self.time_s + shift_s
-        return replace(self, time_s=time_s, samples_s=samples_s)
+        return replace(self, time_s=self.time_s + shift_s, samples_s=self.samples_s + shift_s)
 
 
 def in_seconds(stamps: Stamps, rates_hz: Sequence[float], findings: list[Finding]) -> Stamps | None:
@@ -338,15 +335,14 @@ def even_grid(
         action = f"kept the longest stretch, samples {start + 1} to {stop} of {len(steps) + 1}"
         findings.append(Finding("time", "", found, expected, action, "warning"))
     kept = replace(stamps, values=stamps.values[start:stop])
-    rate_hz, first_s = _printed_rate(kept, rates_hz, base_hz) or (0.0, 0.0)
-    if rate_hz:
-        time_s = first_s + np.arange(stop - start) / rate_hz
-        samples_s = time_s
-    elif not np.median(np.diff(kept.values)) > 0:
+    samples_s = kept.values
+    if (printed := _printed_rate(kept, rates_hz, base_hz)) is not None:
+        rate_hz, first_s = printed
+        time_s = samples_s = first_s + np.arange(stop - start) / rate_hz
+    elif not np.median(np.diff(samples_s)) > 0:
         return None
     else:
-        rate_hz, time_s = _uneven_times(kept.values, stated_hz, findings)
-        samples_s = kept.values
+        rate_hz, time_s = _uneven_times(samples_s, stated_hz, findings)
     if len(time_s) > _JUMP * len(samples_s) + 1 or rate_hz > MOST_HZ:
         return None
     if np.isfinite(stated_hz) and abs(rate_hz / stated_hz - 1) > _AGREE * _NEAR:
@@ -363,10 +359,7 @@ def onto_grid(grid: Grid, values: np.ndarray, time_s: np.ndarray | None = None) 
     beside a NaN become NaN.
     """
     values, stamps_s = values[grid.samples], grid.samples_s
-    if time_s is None:
-        if stamps_s is grid.time_s:
-            return values
-        time_s = grid.time_s
+    time_s = grid.time_s if time_s is None else time_s
     nearest = np.clip(np.searchsorted(stamps_s, time_s), 1, len(stamps_s) - 1)
     left_is_nearer = time_s - stamps_s[nearest - 1] < stamps_s[nearest] - time_s
     nearest = nearest - left_is_nearer
@@ -396,20 +389,17 @@ def _printed_rate(
             continue  # hardly a step in all of it
         for rate_hz in chain(rates_hz, _simple_rates(stamps_s, room, base_hz)):
             if rate_hz > 0 and _spread(stamps_s, 1 / rate_hz) <= room:
-                return float(rate_hz), _first(stamps_s, rate_hz, room)
+                own = stamps_s - np.arange(len(stamps_s)) / rate_hz
+                # The first stamp, unless half a digit of the others forbids.
+                low, high = own.max() - room / 2, own.min() + room / 2
+                first = np.clip(stamps_s[0], low, high) if low <= high else own.mean()
+                return float(rate_hz), float(first)
     return None
 
 
 def _spread(stamps_s: np.ndarray, period_s: float) -> float:
     """By how much the stamps leave even times of this period."""
     return float(np.ptp(stamps_s - np.arange(len(stamps_s)) * period_s))
-
-
-def _first(stamps_s: np.ndarray, rate_hz: float, room_s: float) -> float:
-    """The first of the even times: the first stamp, unless half a digit of the others forbids."""
-    own = stamps_s - np.arange(len(stamps_s)) / rate_hz
-    low, high = own.max() - room_s / 2, own.min() + room_s / 2
-    return float(np.clip(stamps_s[0], low, high)) if low <= high else float(own.mean())
 
 
 def _simple_rates(stamps_s: np.ndarray, room_s: float, base_hz: float) -> Iterator[float]:

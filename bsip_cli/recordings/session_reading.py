@@ -326,10 +326,6 @@ class _Choice:
     doubted: Doubted = ""
     is_no_person: bool = False
 
-    @property
-    def is_sure(self) -> bool:
-        return not (self.alternatives or self.is_no_person)
-
 
 def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
     """The readings after every repair that is sure, one after the other.
@@ -340,7 +336,8 @@ def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
     for _ in range(len(now.fits) + 2):
         tried = [now, *others, *now.with_one_more()]
         choice = _surest(tried)
-        if others and not (choice.of is now and choice.is_sure and not now.frame.moved):
+        is_sure = not (choice.alternatives or choice.is_no_person)
+        if others and not (choice.of is now and is_sure and not now.frame.moved):
             choice = _surest([*tried, *(one for o in others for one in o.with_one_more())])
         if choice.of is now:
             break

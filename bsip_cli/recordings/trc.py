@@ -59,7 +59,9 @@ def read_trc(path: Path) -> Trc:
     names, apart = _names(heading, mark)
     check_names([name for name in names if name], "labels", path)
     below = next(lines, "")  # X1, Y1, Z1, X2, ..., or a row where that line is left out
-    lines = chain([below] if _begins_a_row(below) else [], lines)
+    frame_and_time = [_number(cell) for cell in below.split()[:2]]
+    is_row = len(frame_and_time) == 2 and np.isfinite(frame_and_time).all()
+    lines = chain([below] if is_row else [], lines)
     first = list(islice((line for line in lines if line.strip()), ROWS_LOOKED_AT))
     are_counted = apart > 0 and len(below.split()) == 3 * len(names)
     rows = _Rows(names, apart, are_counted, dialect_of(mark, first), path)
@@ -83,12 +85,6 @@ def read_trc(path: Path) -> Trc:
     stamps = Stamps(times, rows.time_digits.sizes(times))
     counts_frames = rows.are_numbered and n_frames == len(times)
     return Trc(labels, stamps, positions, tuple(rates), counts_frames, findings)
-
-
-def _begins_a_row(line: str) -> bool:
-    """With a frame and a time."""
-    cells = line.split()[:2]
-    return len(cells) == 2 and bool(np.isfinite([_number(cell) for cell in cells]).all())
 
 
 def _names(line: str, mark: str | None) -> tuple[list[str], int]:

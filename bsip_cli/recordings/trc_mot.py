@@ -107,30 +107,27 @@ def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, 
             mean = np.abs(force[loaded]).mean(axis=0)
             of_forces = scene.Up(int(np.argmax(mean)), 1, "the forces point there")
             if by_labels and {by_labels.axis, of_forces.axis} == {1, 2}:
-                feet_m = _feet(trc.labels, positions_m) @ scene.rotation_to_z_up(by_labels).T
-                points_m = on_floor / _MM @ scene.rotation_to_z_up(of_forces).T
-                if _lie_below(points_m, feet_m):
+                by_segment = scene.by_segment(
+                    trc.labels, positions_m @ scene.rotation_to_z_up(by_labels).T
+                )
+                feet = [by_segment[name] for name in ("foot_l", "foot_r") if name in by_segment]
+                if _lie_below(on_floor / _MM @ scene.rotation_to_z_up(of_forces).T, feet):
                     return by_labels, of_forces
             surface = scene.up_from_surface(mean[None], on_floor, trc.positions_m)
     up = surface or by_labels or scene.Up(1, 1, "the convention of TRC files")
     return up, up
 
 
-def _feet(labels: tuple[str, ...], positions_m: np.ndarray) -> np.ndarray:
-    """Every place of every marker of the feet, (n, 3)."""
-    by_segment = scene.by_segment(labels, positions_m)
-    feet = [by_segment[foot].reshape(-1, 3) for foot in ("foot_l", "foot_r") if foot in by_segment]
-    every = np.concatenate(feet or [np.zeros((0, 3))])
-    return every[np.isfinite(every).all(axis=1)]
-
-
-def _lie_below(points_m: np.ndarray, feet_m: np.ndarray) -> bool:
+def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     """Whether points of force (n, 3), in m or, where no laboratory is so large, in cm or mm, lie
-    where the feet are seen, in axes turned by some right angle about the vertical."""
+    where markers of the feet (n_frames, k, 3) are seen, in axes turned by some right angle about
+    the vertical."""
+    seen = np.concatenate([np.zeros((0, 3)), *(foot.reshape(-1, 3) for foot in feet_m)])
+    seen = seen[np.isfinite(seen).all(axis=1)]
     points = points_m[np.isfinite(points_m).all(axis=1), :2] @ np.array([1.0, 1j])
-    if not len(points) or not len(feet_m):
+    if not len(points) or not len(seen):
         return False
-    near = cKDTree(feet_m[:, :2])
+    near = cKDTree(seen[:, :2])
     sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
     turned = (points * size * 1j**quarter for size in sizes for quarter in range(4))
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)

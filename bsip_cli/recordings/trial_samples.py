@@ -82,10 +82,6 @@ class Lags:
     path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     drift_s: float = 0.0
 
-    def steps_s(self) -> np.ndarray:
-        """When the centre of mass is where the path has it, (m,)."""
-        return (self.seconds[1] - self.seconds[0]) * np.arange(len(self.path_m))
-
     def _now(self, kind: np.ndarray) -> np.ndarray:
         """Of a kind (..., n) at the stated times, nearly, (...,)."""
         now = np.abs(self.seconds) <= LEAST_S
@@ -286,9 +282,10 @@ class TrialSamples:
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others
         )
+        steps_s = (found.seconds[1] - found.seconds[0]) * np.arange(len(found.path_m))
         return replace(
             stated,
-            course=Course.of(opened, found.steps_s(), found.path_m, found.goes()),
+            course=Course.of(opened, steps_s, found.path_m, found.goes()),
             drift_s=found.drift_s,
             delay=none,
             late=tuple(one for one in late if one.sources),

@@ -268,7 +268,10 @@ def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Na
 def _static(participant: str, own: Sequence[Found], notes: list[str]) -> list[Found]:
     """Those that calibrate: called so and still; else the stillest, if somebody stands there."""
     called = [one for one in own if _is_called_static(one.stem) or _is_in_static_folder(one)]
-    still = [one for one in called if _is_still(one)]
+    # Words that movements have too must be still nearly all the time.
+    clear = [one for one in called if _is_in_static_folder(one) or _STATIC & {*words(one.stem)}]
+    speeds = {one.path: one.median_m_s if one in clear else one.fastest_m_s for one in called}
+    still = [one for one in called if speeds[one.path] < STILL_M_S]
     moving = [one.path.name for one in called if one not in still]
     if moving:
         notes.append(
@@ -297,11 +300,6 @@ def _only_sorts(folder: str) -> bool:
     letters = [word for word in words(folder) if word.isalpha()]
     is_date = not letters and len(re.sub(r"\D", "", folder)) >= _DATE
     return is_date or (bool(letters) and _SORTING.issuperset(letters))
-
-
-def _is_still(one: Found) -> bool:
-    is_clear = _is_in_static_folder(one) or not _STATIC.isdisjoint(words(one.stem))
-    return (one.median_m_s if is_clear else one.fastest_m_s) < STILL_M_S
 
 
 def is_sequence(task: str) -> bool:

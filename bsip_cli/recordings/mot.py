@@ -325,9 +325,9 @@ def _columns_of(
                 "(the height of a point on the floor, a torque about a level axis)"
             )
             raise refusal(path, found, "columns for x, y and z", remedy)
-    found = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
-    moments = [found.pop(name) for name in ("torque", "moment") if name in found]
-    return found | ({"moment": moments[0 if "point" in found else -1]} if moments else {})
+    known = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
+    moments = [known.pop(name) for name in ("torque", "moment") if name in known]
+    return known | ({"moment": moments[0 if "point" in known else -1]} if moments else {})
 
 
 def _force(name: str, columns: dict[str, list[int]], table: _Table, path: Path) -> GroundForce:

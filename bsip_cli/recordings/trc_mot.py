@@ -53,23 +53,30 @@ def open_trc_mot(path: Path, written: Written = AS_WRITTEN) -> Opened:
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up, up_of_forces = _ups(trc, positions, mot)
     rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
-    read = _forces(mot, of_forces, times, most, written.force_pace)
+    findings = [*trc.findings, *findings, *_about_ups(up, up_of_forces)]
+    sources: tuple[ForceOnPoint, ...] = ()
+    rate_hz, lengths, note = times.rate_hz, None, ""
+    try:
+        paced = mot and replace(mot, stamps=mot.stamps.faster(written.force_pace))
+        rate_hz, sources, lengths = _forces(paced, of_forces, times, most, findings)
+    except _NoForcesError as why:
+        note = str(why)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
         labels=trc.labels,
         markers_m=positions @ rotation.T,
-        analog_rate_hz=read.rate_hz,
+        analog_rate_hz=rate_hz,
         plates=(),
-        findings=(*trc.findings, *findings, *_about_ups(up, up_of_forces), *read.findings),
+        findings=tuple(findings),
         rotation_world_lab=rotation,
-        forces_note=read.note,
+        forces_note=note,
         time0_s=times.first_s,
     )
-    return Opened(recording, read.sources, read.lengths, partial(open_trc_mot, path))
+    return Opened(recording, sources, lengths, partial(open_trc_mot, path))
 
 
-def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple[Finding, ...]]:
+def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, list[Finding]]:
     """Times, positions (n, n_markers, 3) at these even times, and what was done."""
     if len(trc.stamps.values) < 2:
         found, expected = f"{len(trc.stamps.values)} frame", "at least 2 frames with times"
@@ -88,7 +95,7 @@ def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple
     unsure_s = float(np.ptp(stamps.values[grid.samples] - grid.samples_s))
     first_s, unsure_s = float(grid.time_s[0]), np.inf if stamps.unit == FRAMES else unsure_s
     times = _MarkerTimes(first_s, grid.rate_hz, len(grid.time_s), unsure_s)
-    return times, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
+    return times, onto_grid(grid, trc.positions_m), [*findings, *grid.findings]
 
 
 def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, scene.Up]:
@@ -142,46 +149,34 @@ def _about_ups(up: scene.Up, of_forces: scene.Up) -> list[Finding]:
     return [Finding("up_axis", "forces", found, "one laboratory frame", action, "corrected")]
 
 
-@dataclass(frozen=True, eq=False)
-class _Forces:
-    """As written, on the markers' time; ``note``: why there are none."""
-
-    rate_hz: float
-    sources: tuple[ForceOnPoint, ...] = ()
-    lengths: Lengths | None = None
-    note: str = ""
-    findings: tuple[Finding, ...] = ()
-
-
 class _NoForcesError(Exception):
     """Why a table gives no forces."""
 
 
 def _forces(
-    mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int, pace: float
-) -> _Forces:
-    none = _Forces(markers.rate_hz, note="no .mot file of the same name next to the .trc")
+    mot: Mot | None,
+    rotation: np.ndarray,
+    markers: _MarkerTimes,
+    most_values: int,
+    findings: list[Finding],
+) -> tuple[float, tuple[ForceOnPoint, ...], Lengths]:
+    """Rate, forces as written on the markers' time, and how long they last; adds what is said."""
     if mot is None:
-        return none
-    findings = list(mot.findings)
-    try:
-        _check_placed(mot)
-        grid = _force_grid(mot.stamps.faster(pace), markers, findings)
-        last = markers.lasts_s() * grid.rate_hz
-        if 6 * last * len(mot.forces) > most_values:
-            rows = len(mot.stamps.values)
-            raise _NoForcesError(
-                f"the .mot has {rows} rows and {last:.3g} would be needed for the .trc"
-            )
-    except _NoForcesError as why:
-        return replace(none, note=str(why), findings=tuple(findings))
+        raise _NoForcesError("no .mot file of the same name next to the .trc")
+    findings += mot.findings
+    _check_placed(mot)
+    grid = _force_grid(mot.stamps, markers, findings)
+    last = markers.lasts_s() * grid.rate_hz
+    if 6 * last * len(mot.forces) > most_values:
+        rows = len(mot.stamps.values)
+        needed = f"the .mot has {rows} rows and {last:.3g} would be needed for the .trc"
+        raise _NoForcesError(needed)
     samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
     findings += [*grid.findings, *_about_missing(mot)]
     sources = [_source(one, grid, samples_s, rotation, markers, findings) for one in mot.forces]
     forces_s = float(grid.time_s[-1] - grid.time_s[0])
     step_s = max(1 / grid.rate_hz, 1 / markers.rate_hz)
-    lengths = Lengths(markers.lasts_s(), forces_s, step_s)
-    return _Forces(grid.rate_hz, tuple(sources), lengths, findings=tuple(findings))
+    return grid.rate_hz, tuple(sources), Lengths(markers.lasts_s(), forces_s, step_s)
 
 
 def _source(

@@ -176,11 +176,11 @@ def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict
     samples = np.round(frames * analog_hz / rate_hz).astype(int)
     samples = samples[samples < min(len(source.usable) for source in opened.sources)]
     wrenches = {}
-    smooth = {one.name: one.smoothed(SMOOTH_S * analog_hz) for one in opened.sources}
+    smooth = {one.name: one.smoothed(SMOOTH_S * analog_hz).at(samples) for one in opened.sources}
     repeated = repeated_plates([{one.name: one for one in opened.sources}], [smooth])
     for name, source in smooth.items():
         if name not in repeated:
-            wrenches[name] = source.at(samples).parts() @ source.matrix(AS_STATED).T
+            wrenches[name] = source.parts() @ source.matrix(AS_STATED).T
     body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
     return body, samples, wrenches
 

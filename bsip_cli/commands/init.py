@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
+from typing import Literal
 
 import click
 from tqdm import tqdm
@@ -24,8 +25,8 @@ from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
 from bsip_cli.report.blocks import environment
 from bsip_cli.study import participants
-from bsip_cli.study.new_study import Named, counted, is_sequence, name_all, plain
-from bsip_cli.study.trials import listed
+from bsip_cli.study.new_study import Named, is_sequence, name_all, plain
+from bsip_cli.study.trials import kinds, listed
 
 # --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
 
@@ -77,56 +78,51 @@ def read_tables(
 STARTER = "markers.toml"
 
 
-@dataclass(frozen=True)
-class StudyMarkers:
-    """The marker set for study.toml, and the starter's TOML where no shipped one fits."""
-
-    name: str
-    starter: str
-    notes: tuple[str, ...]
+_Trials = Sequence[tuple[Source, Named]]
 
 
-def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
-    """The one shipped set that recordings fit; several are left to guess; a starter where none."""
-    guessed: dict[str, list[Source]] = defaultdict(list)
-    for source in sources:
+def _study_markers(trials: _Trials) -> tuple[str, str, list[str]]:
+    """The marker set for study.toml: the one shipped set that recordings fit, "auto" where there
+    are several; the TOML of a first one, where none fits; and what is to be said."""
+    guessed: dict[str, list[tuple[Source, Named]]] = defaultdict(list)
+    for source, named in trials:
         name = ""  # without a shipped set that fits, or with two people in the file, as ingest says
         with suppress(BadDataError):
             guess = told_from(source.written)
             name = guess.name if guess.is_shipped else ""
-        guessed[name].append(source)
+        guessed[name].append((source, named))
     unknown = guessed.pop("", [])
     if not guessed:
-        return _starter(unknown, named)
-    served = {named[source.path].participant for own in guessed.values() for source in own}
-    others = {named[source.path].participant for source in unknown} - served
-    name = next(iter(guessed)) if len(guessed) == 1 and not others else "auto"
+        return _starter(unknown)
+    served = {named.participant for own in guessed.values() for _, named in own}
+    others = {named.participant for _, named in unknown} - served
     notes = []
     if unknown:
+        paths = [source.path for source, _ in unknown]
         notes.append(
-            f"no shipped marker set fits {listed(source.path.name for source in unknown)}: ingest "
-            f"may refuse them; `bsip markers {quote(str(unknown[0].path))}` makes one, which "
+            f"no shipped marker set fits {listed(path.name for path in paths)}: ingest "
+            f"may refuse them; `bsip markers {quote(str(paths[0]))}` makes one, which "
             "serves in a study of their own"
         )
     if len(guessed) > 1:
         notes.append(f"several marker sets, guessed for each recording: {', '.join(guessed)}")
-    return StudyMarkers(name, "", tuple(notes))
+    return next(iter(guessed)) if len(guessed) == 1 and not others else "auto", "", notes
 
 
-def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
-    order = sorted(sources, key=lambda source: named[source.path].task != "static")
+def _starter(trials: _Trials) -> tuple[str, str, list[str]]:
+    order = [source for source, _ in sorted(trials, key=lambda pair: pair[1].task != "static")]
     labels = dict.fromkeys(label for source in order for label in source.written)
     try:
         guess = told_from(tuple(labels))
     except BadDataError as several:
         note = f"no shipped marker set fits, nor one for all recordings together: {several.found}"
-        return StudyMarkers("auto", "", (f"{note}; a study per laboratory may do",))
+        return "auto", "", [f"{note}; a study per laboratory may do"]
     note = (
         f"no shipped marker set fits: {STARTER} in the study is a first one, guessed from the "
         "labels; check it before you trust a number"
     )
     named_in = printable(order[0].path.name), STARTER
-    return StudyMarkers(STARTER, starter_toml(guess.marker_set, guess.unknown, *named_in), (note,))
+    return STARTER, starter_toml(guess.marker_set, guess.unknown, *named_in), [note]
 
 
 _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
@@ -134,21 +130,23 @@ _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Everything that will be written, and where; links instead of copies where asked."""
+    """Everything that will be written, and where."""
 
     out: Path
-    link: bool
-    named: Mapping[Path, Named]  # by the source's path
-    sources: tuple[Source, ...]
+    made: Literal["linked", "copied"]
+    trials: _Trials
     people: Mapping[str, StatedPerson]
-    markers: StudyMarkers
-    unused: tuple[Unused, ...]
-    tables: tuple[Path, ...]
-    notes: tuple[str, ...]
+    marker_set: str
+    starter: str
+    unused: Sequence[Unused]
+    tables: Collection[Path]
+    notes: Sequence[str]
 
-    @property
-    def made(self) -> str:
-        return "linked" if self.link else "copied"
+    def files(self) -> Iterator[tuple[Path, Path, Named]]:
+        """Where each lies, and where in the study it will."""
+        for source, named in self.trials:
+            for path in filter(None, (source.path, source.forces)):
+                yield path, named.folder / f"{named.stem}{path.suffix.lower()}", named
 
 
 def init_command(given: tuple[Path, ...], out: Path, participant: str, link: bool) -> int:
@@ -186,7 +184,7 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
         )
     called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
     tables = [path for path in called if path.suffix.lower() in _KINDS]
-    plan = _planned(out, link, sources, unused, participant, tables)
+    plan = _planned(out, "linked" if link else "copied", sources, unused, participant, tables)
     _write(plan)
     _say(_in_words(plan))
     return 3 if any(one.is_fault for one in unused) else 0
@@ -212,7 +210,7 @@ def _check_out(out: Path) -> None:
 
 def _planned(
     out: Path,
-    link: bool,
+    made: Literal["linked", "copied"],
     sources: Sequence[Source],
     unused: Sequence[Unused],
     participant: str,
@@ -220,9 +218,10 @@ def _planned(
 ) -> _Plan:
     all_named, notes = name_all(sources, participant)
     named = {one.found.path: one for one in all_named}
+    trials = [(source, named[source.path]) for source in sources]
     of: dict[str, dict[str, StatedPerson]] = defaultdict(dict)
-    for source in sorted(sources, key=lambda source: named[source.path].stem):
-        of[named[source.path].participant][source.path.name] = source.stated
+    for source, one in sorted(trials, key=lambda pair: pair[1].stem):
+        of[one.participant][source.path.name] = source.stated
     in_tables, about_tables = read_tables(tables, of)
     people, said = {}, [*notes, *about_tables]
     for name, stated in sorted(of.items()):
@@ -231,10 +230,10 @@ def _planned(
         people[name], contradictions = together(stated)
         said += [f"{name}: {one}" for one in contradictions]
     used = {file for file, _ in in_tables.values()}
-    left = tuple(one for one in unused if one.path not in used)
-    markers = study_markers(sources, named)
-    said += markers.notes
-    return _Plan(out, link, named, tuple(sources), people, markers, left, tuple(used), tuple(said))
+    left = [one for one in unused if one.path not in used]
+    marker_set, starter, about_markers = _study_markers(trials)
+    said += about_markers
+    return _Plan(out, made, trials, people, marker_set, starter, left, used, said)
 
 
 # --- what is written ------------------------------------------------------------------------------
@@ -248,10 +247,10 @@ def _write(plan: _Plan) -> None:
         out.parent.mkdir(parents=True, exist_ok=True)
         made.mkdir()
         try:
-            for source, target, _ in _files(plan):
+            for source, target, _ in plan.files():
                 place = made / target
                 place.parent.mkdir(parents=True, exist_ok=True)
-                if plan.link:
+                if plan.made == "linked":
                     place.symlink_to(source.resolve())
                 else:
                     shutil.copy2(source, place)
@@ -264,7 +263,7 @@ def _write(plan: _Plan) -> None:
                 "participants.tsv": _table([participants.KNOWN, *people]),
                 "study.toml": _study_toml(plan),
                 "sources.tsv": _table(_source_rows(plan)),
-            } | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
+            } | ({STARTER: plan.starter} if plan.starter else {})
             for name, text in texts.items():
                 (made / name).write_text(text, encoding="utf-8")
             if out.is_dir():
@@ -277,16 +276,9 @@ def _write(plan: _Plan) -> None:
         raise not_writable(plan.out, error) from None
 
 
-def _files(plan: _Plan) -> Iterator[tuple[Path, Path, Named]]:
-    for source in plan.sources:
-        named = plan.named[source.path]
-        for path in filter(None, (source.path, source.forces)):
-            yield path, named.folder / f"{named.stem}{path.suffix.lower()}", named
-
-
 def _source_rows(plan: _Plan) -> Iterator[tuple[str, ...]]:
     yield _COLUMNS
-    for source, target, named in _files(plan):
+    for source, target, named in plan.files():
         place = str(target), str(source.absolute()), plan.made
         yield *place, named.participant, named.task, ""
     for table in plan.tables:
@@ -303,11 +295,11 @@ def _table(rows: Iterable[tuple[str, ...]]) -> str:
 
 
 def _study_toml(plan: _Plan) -> str:
-    tasks = sorted({named.task for named in plan.named.values()})
+    tasks = sorted({named.task for _, named in plan.trials})
     sequences = ", ".join(f'"{task}"' for task in tasks if is_sequence(task))
-    moving = Counter(n.participant for n in plan.named.values() if n.task != "static")
+    moving = Counter(n.participant for _, n in plan.trials if n.task != "static")
     alone = set(moving.values()) == {1} and not sequences
-    known = {"marker_set": plan.markers.name, "sequences": sequences, "alone": alone}
+    known = {"marker_set": plan.marker_set, "sequences": sequences, "alone": alone}
     return environment().get_template("study.toml.j2").render(known)
 
 
@@ -321,7 +313,7 @@ def _say(lines: Iterator[str]) -> None:
 
 def _in_words(plan: _Plan) -> Iterator[str]:
     for name, stated in plan.people.items():
-        trials = sorted(n.stem for n in plan.named.values() if n.participant == name)
+        trials = sorted(n.stem for _, n in plan.trials if n.participant == name)
         short = listed(stem.removeprefix(f"{name}_") for stem in trials)
         yield f"{name}: {stated.words() or 'mass, height and sex not stated'}: {short}"
     lacking = [name for name, one in plan.people.items() if not one.sex]
@@ -333,10 +325,10 @@ def _in_words(plan: _Plan) -> Iterator[str]:
         )
     if plan.tables:
         yield f"read of people: {listed(str(table) for table in plan.tables)}"
-    yield f"marker set: {plan.markers.name}"
+    yield f"marker set: {plan.marker_set}"
     yield from plan.notes
     yield from _unused_lines(plan.unused)
-    yield f"{len([*_files(plan)])} files {plan.made}; sources.tsv says what came from where"
+    yield f"{len([*plan.files()])} files {plan.made}; sources.tsv says what came from where"
     results = plan.out / "derivatives" / "bsip"
     yield f"next: bsip run {quote(str(plan.out))} --out {quote(str(results))}"
 
@@ -345,8 +337,7 @@ def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:
     """What is no recording in one line for all kinds; everything else with its reason."""
     others = [one for one in unused if one.why == NO_RECORDING]
     if others:
-        kinds = counted(one.path.suffix.lower() or "without an ending" for one in others)
-        yield f"not used, no recordings: {kinds}"
+        yield f"not used, no recordings: {kinds(one.path for one in others)}"
     reasons: dict[str, list[str]] = defaultdict(list)
     for one in unused:
         if one not in others:

@@ -101,23 +101,28 @@ def read_sources(
     unused: list[Unused] = []
     kept: list[Source] = []
     hashes: dict[str, Path] = {}
+    # A C3D holds markers and forces: it goes before a TRC of its name in its folder.
+    c3d_of = {_place(one.path): one.path for one in reversed(files) if one.kind == ".c3d"}
     for one in progress([file for file in files if file.kind in RECORDINGS]):
         try:
             twin = hashes.setdefault(file_hash(one.path), one.path)
             if twin != one.path:
                 unused.append(Unused(one.path, f"holds the same as {twin.name}"))
-            elif one.kind == ".trc" and (container := _container_of(one, files)):
-                why = f"{container.path.name}, of the same name, is used"
-                unused.append(Unused(one.path, why))
+            elif one.kind == ".trc" and (c3d := c3d_of.get(_place(one.path))):
+                unused.append(Unused(one.path, f"{c3d.name}, of the same name, is used"))
             else:
                 kept.append(_source(one, files, unused))
         except BadDataError as refusal:
             unused.append(Unused(one.path, _why(refusal), is_fault=True))
     done = {source.forces for source in kept} | {one.path for one in unused}
-    c3d = {source.path.stem.casefold() for source in kept if source.forces is None}
+    whole = {source.path.stem.casefold() for source in kept if source.forces is None}
     left = (one for one in files if one.path not in done and one.kind not in RECORDINGS)
-    unused += [_unused(one, files, c3d) for one in left]
+    unused += [_unused(one, files, whole) for one in left]
     return kept, unused
+
+
+def _place(path: Path) -> tuple[Path, str]:
+    return path.parent, path.stem.casefold()
 
 
 def _why(refusal: BadDataError) -> str:
@@ -141,13 +146,6 @@ def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unus
 
 
 # --- which files are of one trial, by their names and places --------------------------------------
-
-
-def _container_of(trc: Listed, files: Sequence[Listed]) -> Listed | None:
-    """The C3D of its name in its folder, which holds markers and forces."""
-    own = trc.path.parent, trc.path.stem.casefold()
-    near = (one for one in files if (one.path.parent, one.path.stem.casefold()) == own)
-    return next((one for one in near if one.kind == ".c3d"), None)
 
 
 def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
@@ -181,15 +179,7 @@ def trial_words(path: Path) -> tuple[str, ...]:
 def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Source:
     forces = None
     if one.kind == ".trc":
-        # tables of its name, from the nearest folder that has one, which no other TRC has
-        tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
-        own = [table for table in tables if _markers_of(table, files) == [one]]
-        is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
-        if not tables and is_alone:  # a file was given, and not the folder
-            nearby = (Listed(path, one.folders) for path in entries(one.path.parent))
-            own = _nearest(one, (file for file in nearby if file.kind in ENDINGS))
-        paths = sorted(file.path for file in own)
-        recording, forces = _with_forces(one, _tables(paths, unused), unused)
+        recording, forces = _with_forces(one, _tables_of(one, files, unused), unused)
     else:
         recording = read_recording(one.path)
     bare = [label.rpartition(":")[2].strip() for label in recording.labels]
@@ -209,10 +199,18 @@ def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Sourc
     return Source(*found, forces, recording.stated, written)
 
 
-def _tables(paths: Sequence[Path], unused: list[Unused]) -> list[Path]:
-    """Those that hold forces, where several have the trial's name."""
+def _tables_of(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> list[Path]:
+    """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has; where
+    there are several, those that hold forces."""
+    tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
+    own = [table for table in tables if _markers_of(table, files) == [one]]
+    is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
+    if not tables and is_alone:  # a file was given, and not the folder
+        nearby = (Listed(path, one.folders) for path in entries(one.path.parent))
+        own = _nearest(one, (file for file in nearby if file.kind in ENDINGS))
+    paths = sorted(file.path for file in own)
     if len(paths) < 2:
-        return list(paths)
+        return paths
     forces = []
     for path in paths:
         try:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,15 +26,15 @@ from bsip_cli.recordings.text_tables import (
     check_names,
     dialect_of,
     head_of,
-    is_missing,
     number,
     parted,
     row_counts,
     separator_of,
     text_lines,
+    values_of,
     without_end,
 )
-from bsip_cli.recordings.units import force_in_N
+from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
@@ -69,15 +71,13 @@ class _Table:
     time_digits: LastDigit
     is_cut: bool
     dialect: Dialect
-    force_N: float = 1.0  # what a force of 1 is, in the unit of its column
+    force_N: float  # what a force of 1 is, in the unit of its column
 
     def unit(self, column: int) -> str:
         """In brackets behind the column's name, else in the row of units."""
-        if (meaning := meaning_of(self.names[column])) is not None and meaning.unit:
-            return meaning.unit
         if column == 0 and (bracket := re.search(r"[\[(_]([^\[\]()]+)[\])]?$", self.names[0])):
             return bracket[1]
-        return self.units[column].strip("[]() ")
+        return _without_unit(self.names[column])[1] or self.units[column].strip("[]() ")
 
 
 def read_mot(path: Path, force_N: float = 1.0) -> Mot:
@@ -90,7 +90,7 @@ def read_mot(path: Path, force_N: float = 1.0) -> Mot:
     first = end if end and _names(end) else next((line for line in lines if line.strip()), "")
     if end is None or not first:
         raise _no_table(path)
-    table = replace(_read_table(lines, first, path), force_N=force_N)
+    table = _read_table(lines, first, path, force_N)
     stated = next((float(m[1]) for line in header if (m := _ROWS.match(line.strip()))), np.nan)
     findings = row_counts("rows of forces", stated, len(table.values))
     if table.is_cut:
@@ -113,7 +113,7 @@ def _no_table(path: Path) -> BadDataError:
     return refusal(path, "no table after 'endheader'", "a MOT file", _AGAIN)
 
 
-def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
+def _read_table(lines: Iterator[str], first: str, path: Path, force_N: float) -> _Table:
     """The table below the line of names, which may be parted otherwise than its rows."""
     mark = separator_of(first)
     check_names(parted(first, mark), "columns", path)
@@ -131,7 +131,7 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
     said = parted(units, separator_of(units))
     values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
     units_of = said if len(said) == len(names) else [""] * len(names)
-    return _Table(names, units_of, values, digits, is_cut, dialect)
+    return _Table(names, units_of, values, digits, is_cut, dialect, force_N)
 
 
 def _values(
@@ -148,8 +148,13 @@ def _values(
         if len(cells) != n_columns:
             short = len(cells)
             continue
+        row_values, words = values_of(cells)
+        if words:
+            found = f"its table cannot be read: '{printable(words[0][:40])}' is no number"
+            expected = "numbers, and empty cells or nan where one is missing"
+            raise refusal(path, found, expected, _AGAIN)
         digits.add(cells[0])
-        values.extend(_numbers(cells, path))
+        values.extend(row_values)
     is_cut = 0 < short < n_columns and len(values) > 0 and not goes_on
     if short and not is_cut:
         expected = f"{n_columns}, as many as there are columns"
@@ -159,48 +164,55 @@ def _values(
     return table, digits, is_cut
 
 
-def _numbers(cells: list[str], path: Path) -> list[float]:
-    try:
-        return list(map(float, cells))
-    except ValueError:
-        word = next((c for c in cells if not is_missing(c) and np.isnan(number(c))), "")
-    if word:
-        found = f"its table cannot be read: '{printable(word[:40])}' is no number"
-        raise refusal(path, found, "numbers, and empty cells or nan where one is missing", _AGAIN)
-    return list(map(number, cells))
-
-
 # --- what the columns mean ------------------------------------------------------------------------
 
-# Words, then an axis with or without the letter of its quantity (vx, Fx, px, x), then what is left.
+# Parts of a column's name, in whatever order and without accents, in English, German, Spanish,
+# French, Italian and Portuguese; what is left of it names the plate.
 _WORDS = {
-    **dict.fromkeys(("force", "forces", "grf", "grfs"), "force"),
-    **dict.fromkeys(("cop", "pressure", "point", "position"), "point"),
-    **dict.fromkeys(("moment", "moments", "grm"), "moment"),
-    **dict.fromkeys(("torque", "torques"), "torque"),
-    **dict.fromkeys(("left", "right"), "side"),
-    **dict.fromkeys(("ground", "reaction", "plate", "platform", "external", "free"), ""),
-    **dict.fromkeys(("centre", "center", "application", "applied"), ""),
+    word: meaning
+    for meaning, words in {
+        "force": "force forces grf grfs kraft krafte kraefte fuerza fuerzas forza forze forca "
+        "forcas",
+        "point": "cop pressure point position druckpunkt druckmittelpunkt angriffspunkt punto "
+        "ponto presion pression pressione pressao posicion posizione posicao",
+        "moment": "moment moments grm momente drehmoment drehmomente momento momentos momenti",
+        "torque": "torque torques couple coppia",
+        "side": "left right links rechts izquierda derecha gauche droite sinistra destra esquerda "
+        "direita",
+        "ground": "ground boden suelo suolo",
+        "": "reaction reaktion reaktions reaccion reazione reacao plate platform platte plattform "
+        "messplatte plateforme plaque plataforma piattaforma pedana external externa esterna free "
+        "freies libre libero livre centre center centro application applied applicazione "
+        "aplicacion aplicacao",
+    }.items()
+    for word in words.split()
 }
+# Other words hold these too, as forearm does: they stand alone, or before an axis.
+_SHORT = {"for": "force", "mom": "moment", "cdp": "point"}
+_MEANINGS = _WORDS | _SHORT | {"fp": "ground"}
+_LINKS = "of|de|di|do|da|du|des|del|della|le|la|der|am|sol|solo|axis|eje|axe|achse|asse|eixo"
+_LINKS += "|(?:d|l|dell)(?=['\N{RIGHT SINGLE QUOTATION MARK}])"
 _LETTERS = {"v": "force", "f": "force", "p": "point", "c": "point", "m": "moment", "t": "torque"}
+# An axis comes with or without the letter of its quantity (vx, Fx, px, x).
 _KNOWN = "|".join(sorted(_WORDS, key=len, reverse=True))
-_AXIS = r"[vfpcmt]?[xyz](?=[lr]?(?![a-z]))"
+_AXIS = rf"(?:[vfpcmt]?[xyz](?=[lr]?(?![a-z]))|(?<![a-z])[xyz](?={_KNOWN}))"
 _TOKEN = re.compile(
-    rf"(?P<word>{_KNOWN}|fp(?![a-z]))|(?:(?<![a-z])of(?![a-z]))|(?P<number>\d+)|(?P<axis>{_AXIS})"
+    rf"(?P<word>{_KNOWN}|fp(?![a-z])|(?<![a-z])(?:{'|'.join(_SHORT)})(?=[xyz]?(?![a-z])))"
+    rf"|(?<![a-z])(?:{_LINKS})(?![a-z])|(?P<number>\d+)|(?P<axis>{_AXIS})"
     rf"|(?P<other>[lr](?={_AXIS})|[a-z]+?(?={_KNOWN}|{_AXIS}|[^a-z]|$))"
 )
+_PRESSURE_PLATE = re.compile(r"pressure(?=[\W_]*plat)")  # says nothing of points
 _JOINT_REACTION = re.compile(r"_on_.+_in_")  # OpenSim's: body_on_body_in_frame
-_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+_BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_PLATE = re.compile(r"[^\W\d]*[\W_]*\d{1,2}|[lrgdise]", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class Meaning:
+class Meaning(NamedTuple):
     """What one column holds."""
 
     plate: str  # "" where the name says none
     quantity: str  # force, point, moment, torque
     axis: str  # x, y, z
-    unit: str  # in brackets behind the name, "" without
 
 
 def meaning_of(name: str) -> Meaning | None:
@@ -209,25 +221,37 @@ def meaning_of(name: str) -> Meaning | None:
     None for a name with no axis, with two, or with no word or letter for a quantity, and for the
     force between two bodies.
     """
-    unit = _UNIT.search(name)
-    tokens = list(_TOKEN.finditer(_UNIT.sub("", name).lower()))
+    letters = unicodedata.normalize("NFKD", _without_unit(name)[0].lower())
+    plain = _PRESSURE_PLATE.sub("", "".join(x for x in letters if not unicodedata.combining(x)))
+    tokens = list(_TOKEN.finditer(plain))
     axes = [token["axis"] for token in tokens if token["axis"]]
-    if len(axes) != 1 or _JOINT_REACTION.search(name.lower()):
+    if len(axes) != 1 or _JOINT_REACTION.search(plain):
         return None
-    words = [token["word"] for token in tokens if token["word"]]
-    said = [quantity for word in words if (quantity := _WORDS.get(word, "")) not in ("", "side")]
-    plate = [name for token in tokens if (name := token["number"] or token["other"])]
-    plate += [word[0] for word in words if _WORDS.get(word) == "side"]
+    said = [_MEANINGS[token["word"]] for token in tokens if token["word"]]
+    plate = [part for token in tokens if (part := token["number"] or token["other"])]
+    plate += [word[0] for token in tokens if _MEANINGS.get(word := token["word"]) == "side"]
     letter = axes[0][:-1]
-    if letter == "v" and "force" not in said and not {"ground", "fp"} & set(words):
+    if letter == "v" and not {"force", "ground"} & set(said):
         return None  # a velocity
-    quantity = _LETTERS[letter] if letter else said[-1] if said else ""
+    quantities = [one for one in said if one in _LETTERS.values()]
+    # The centre of pressure of a force, the moment on a force plate.
+    quantities = [one for one in quantities if one != "force"] or quantities
+    quantity = _LETTERS[letter] if letter else quantities[-1] if quantities else ""
     if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):
         plate.remove(alone)  # F1_x
         quantity = _LETTERS[alone]
-    if not quantity:
-        return None
-    return Meaning("".join(plate), quantity, axes[0][-1], unit[1].strip() if unit else "")
+    return Meaning("".join(plate), quantity, axes[0][-1]) if quantity else None
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    """A name and the unit in its brackets: what stands at its end and is no plate, or is known."""
+    for bracket in _BRACKET.finditer(name):
+        inside = bracket[1].strip()
+        is_known = any(size(inside) for size in (length_in_m, force_in_N, moment_in_Nm))
+        is_last = not name[bracket.end() :].strip()
+        if is_known or (is_last and not _PLATE.fullmatch(inside)):
+            return f"{name[: bracket.start()]} {name[bracket.end() :]}".strip(), inside
+    return name, ""
 
 
 def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Finding]]:
@@ -249,11 +273,11 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
         found = "no ground force among the columns " + ", ".join(table.names[:8])
         remedy = f"rename the columns or {_AGAIN}"
         raise refusal(path, found, "columns like ground_force_1_vx", remedy)
-    used = {0}
-    forces = tuple(
-        _force(str(k + 1), plate, columns, table, used, path)
-        for k, (plate, columns) in enumerate(plates.items())
-    )
+    forces, used = [], {0}
+    for k, (plate, of_plate) in enumerate(plates.items()):
+        columns = _columns_of(plate or str(k + 1), of_plate, table, path)
+        forces.append(_force(str(k + 1), columns, table, path))
+        used.update(chain(*columns.values()))
     largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
     for force in forces:  # a missing point or moment of no force is zero
         idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
@@ -268,7 +292,7 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     found = f"{len(unknown)} columns of the forces that are not understood: {told}{more}"
     expected = "force, point and moment of each plate, by axis"
     about = Finding("columns", "", found, expected, "left them out", "info")
-    return forces, [about] if unknown else []
+    return tuple(forces), [about] if unknown else []
 
 
 def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) -> None:
@@ -282,43 +306,42 @@ def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) ->
         values[here] = values[np.where(is_nearer, rows[before], rows[after])]
 
 
-def _force(
-    name: str,
-    plate: str,
-    columns: dict[str, dict[str, int]],
-    table: _Table,
-    used: set[int],
-    path: Path,
-) -> GroundForce:
-    """One plate's columns, by quantity and axis; marks them in ``used``."""
+def _columns_of(
+    plate: str, columns: dict[str, dict[str, int]], table: _Table, path: Path
+) -> dict[str, list[int]]:
+    """Of force, point and moment, as far as a plate has them, the columns x, y and z.
+
+    Of moments and torques it is these beside a point: free ones.
+    """
     for quantity, axes in columns.items():
         if len(axes) < 3:
             column = printable(table.names[next(iter(axes.values()))])
             found = (
                 f"only {' and '.join(sorted(axes))} of the {quantity} of plate "
-                f"'{printable(plate) or name}' (column '{column}')"
+                f"'{printable(plate)}' (column '{column}')"
             )
             remedy = (
                 "export all three, or add a column of zeros where it is zero by definition "
                 "(the height of a point on the floor, a torque about a level axis)"
             )
             raise refusal(path, found, "columns for x, y and z", remedy)
-    by_quantity = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
-    force, point = by_quantity["force"], by_quantity.get("point")
-    one, other = by_quantity.get("torque"), by_quantity.get("moment")
-    moment = one or other if point else other or one
-    used.update(force, point or (), moment or ())
-    unit = table.unit(force[0])
-    size = force_in_N(unit) if unit else 1.0
-    moments = table.values[:, moment] * table.force_N if moment else None
+    known = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
+    moments = [known.pop(name) for name in ("torque", "moment") if name in known]
+    return known | ({"moment": moments[0 if "point" in known else -1]} if moments else {})
+
+
+def _force(name: str, columns: dict[str, list[int]], table: _Table, path: Path) -> GroundForce:
+    values = {quantity: table.values[:, own] for quantity, own in columns.items()}
+    units = {quantity: table.unit(own[0]) for quantity, own in columns.items()}
+    size = force_in_N(units["force"]) if units["force"] else 1.0
     if size is None:
-        found, remedy = f"forces in '{printable(unit[:20])}'", "export the forces in N"
+        found, remedy = f"forces in '{printable(units['force'][:20])}'", "export the forces in N"
         raise refusal(path, found, "N or kN", remedy)
     return GroundForce(
         name,
-        table.values[:, force] * size * table.force_N,
-        table.values[:, point] if point else None,
-        moments,
-        table.unit(point[0]) if point else "",
-        table.unit(moment[0]) if moment else "",
+        values["force"] * size * table.force_N,
+        values.get("point"),
+        values["moment"] * table.force_N if "moment" in values else None,
+        units.get("point", ""),
+        units.get("moment", ""),
     )

@@ -239,7 +239,8 @@ FORCES_MOVED = (
 _SAME, _MOSTLY = 0.01, 0.9
 # Filtered, it differs by more; but no two plates are loaded at one place. The median distance of
 # centres of pressure was 93 mm at least for 66 pairs of plates in public (kyowadengyo.c3d), 222 mm
-# for all others; a 6 Hz low pass moves it by 0.1 to 3 mm, in running by 14 mm, forces by 3 %.
+# for all others. Once both are averaged, a 6 Hz low pass of all columns moves it by 0.1 to 3 mm, in
+# running by 10 to 19 mm, and forces by 3 % at most, in the median.
 # As the units may be wrong, it must be less than the centre of pressure itself spreads by.
 _SAME_PLACE_M, _NEARLY, _MEETS = 0.03, 0.1, 0.75
 _BEARS = 0.05
@@ -305,7 +306,7 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
-def later_samples(n: int, by: int) -> tuple[np.ndarray, np.ndarray]:
+def later_samples(n: int, by: int | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The ``by``-th after each of n samples, the nearest one where there is none, and where."""
     samples = np.arange(n) + by
     return samples.clip(0, n - 1), (samples >= 0) & (samples < n)
@@ -371,24 +372,30 @@ def averaged(values: np.ndarray, usable: np.ndarray, sigma: float) -> np.ndarray
 # --- plates that are copies or sums of others, as treadmills and virtual plates export them -------
 
 
-def repeated_plates(trials: Sequence[Mapping[str, PlateSource]]) -> dict[str, tuple[str, ...]]:
+def repeated_plates(
+    trials: Sequence[Mapping[str, PlateSource]], smooth: Sequence[Mapping[str, PlateSource]]
+) -> dict[str, tuple[str, ...]]:
     """Names of plates whose force is that of another, or the sum of others, in every trial: as
-    large, or at the same place.
+    large, or, averaged by a bell (``smooth``), at the same place.
 
     Fewer terms are tried first, so that each is needed; of two copies the later one repeats. Forces
     push, whichever way the plate lies and its signs are.
     """
     repeated: dict[str, tuple[str, ...]] = {}
-    wrenches = [{name: _pushing(source) for name, source in trial.items()} for trial in trials]
+    wrenches, smoothed = (
+        [{name: _pushing(source) for name, source in trial.items()} for trial in some]
+        for some in (trials, smooth)
+    )
     floors_m = {name: source.floor_m() for trial in trials for name, source in trial.items()}
     names = list(floors_m)
     for name in reversed(names):
         others = [n for n in names if n != name and n not in repeated]
         earlier = [n for n in others if names.index(n) < names.index(name)]
-        for is_sum in (_is_as_large, partial(_is_at_place, floor_m=floors_m[name])):
+        at_place = partial(_is_at_place, floor_m=floors_m[name])
+        for seen, is_sum in ((wrenches, _is_as_large), (smoothed, at_place)):
             sums = (combinations(others, n) for n in range(2, min(len(others), _MOST_TERMS) + 1))
             possible = chain(combinations(earlier, 1), *sums)
-            found = (some for some in possible if is_sum(*_own_and_sum(wrenches, name, some)))
+            found = (some for some in possible if is_sum(*_own_and_sum(seen, name, some)))
             if name not in repeated and (terms := next(found, None)) is not None:
                 repeated[name] = terms
     return repeated

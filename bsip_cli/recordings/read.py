@@ -92,6 +92,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     delay_s = session.delays_s.get(recording.path.stem, 0.0)
     opened = opened.with_forces_from(delay_s)
     delayed = _about_delay(delay_s, session.delays_s)
+    delayed += _about_drift(session.drifts_s.get(recording.path.stem, 0.0))
     findings = [*findings_about(session), *delayed, *_about_sides(recording)]
     paces = (one.get(recording.path.stem, 1.0) for one in (session.paces, session.maybe_paces))
     surely, maybe = (_other_pace(times, recording.marker_rate_hz) for times in paces)
@@ -293,6 +294,18 @@ def _about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
     action, level = f"{action}too", "warning"
     said = [f"in {name} {delay_words(delay_s)}" for name, delay_s in delays_s.items()]
     return [Finding("delay", "forces", found, expected, action, level) for found in said[:1]]
+
+
+def _about_drift(drift_s: float) -> list[Finding]:
+    if not drift_s:
+        return []
+    way = "behind" if drift_s > 0 else "ahead"
+    found = f"forces and motion drift apart: at the end the forces are about {abs(drift_s):.1f} s "
+    found += f"further {way} than at the start"
+    action = "took the times as they stand; look whether the forces' rate is right, and whether "
+    action += "rows of them were lost and the rest was numbered without gaps"
+    expected = "one clock of markers and forces"
+    return [Finding("delay", "forces", found, expected, action, "warning")]
 
 
 def _about_plate(name: str, verdict: Verdict) -> list[Finding]:

@@ -86,12 +86,12 @@ class Verdict:
 class SessionReading:
     """How all recordings of a session are to be understood: their axes, and each plate.
 
-    ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
-    trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
-    stated rate is not believed. ``of_others`` : by trial whose forces are another's, that one;
-    ``twins`` : where both have them. ``odd`` : by trial that is not as all others are,
-    in what: its "sides", its "forces", or the unit of these.
-    ``moment_scales``, ``point_scales`` : by trial whose units are not those of the others.
+    ``delays_s`` : by trial, of the forces after the markers, where there is one; ``drifts_s`` :
+    what it grows by until the trial's end. ``paces`` : by trial, how many times as fast as stated
+    it ran, where that is sure, or ``maybe_paces`` where the stated rate is not believed.
+    ``of_others`` : by trial whose forces are another's, that one; ``twins`` : where both have them.
+    ``odd`` : by trial that is not as all others are, in what: its "sides", its "forces", or the
+    unit of these. ``moment_scales``, ``point_scales`` : by trial whose units are not the others'.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
     """
@@ -99,6 +99,7 @@ class SessionReading:
     frame: FrameChange = field(default_factory=FrameChange)
     plates: Mapping[str, Verdict] = field(default_factory=dict)
     delays_s: Mapping[str, float] = field(default_factory=dict)
+    drifts_s: Mapping[str, float] = field(default_factory=dict)
     paces: Mapping[str, float] = field(default_factory=dict)
     maybe_paces: Mapping[str, float] = field(default_factory=dict)
     of_others: Mapping[str, str] = field(default_factory=dict)
@@ -185,7 +186,8 @@ def reading_of_files(
 
 def _without_forces(trials: Sequence[TrialSamples], names: Collection[str]) -> list[TrialSamples]:
     """Trials as they are, those of these ``names`` without all that tells of forces."""
-    nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "course": Course()}
+    nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "drift_s": 0.0}
+    nothing["course"] = Course()
     return [
         replace(one.without(one.sources), **nothing) if one.name in names else one for one in trials
     ]
@@ -321,13 +323,14 @@ def session_reading(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) 
             trials = late[delay]
             best = _reading(trials, limits)
     delays = {trial.name: trial.delay.seconds for trial in trials if trial.delay.seconds}
-    return replace(best, delays_s=delays)
+    drifts = {trial.name: trial.drift_s for trial in trials if trial.drift_s}
+    return replace(best, delays_s=delays, drifts_s=drifts)
 
 
 def _reading(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
     is_mirrored = Handedness.of_all([trial.hands for trial in trials]).sign < 0
     changes = MIRRORS if is_mirrored else (FrameChange(), *FORCES_MOVED)
-    repeats = repeated_plates([trial.sources for trial in trials])
+    repeats = repeated_plates([one.sources for one in trials], [one.smooth for one in trials])
     trials = [trial.without(repeats) for trial in trials if trial.sources]
     if not trials:
         return SessionReading(changes[0])
@@ -380,10 +383,6 @@ class _Choice:
     doubted: Doubted = ""
     is_no_person: bool = False
 
-    @property
-    def is_sure(self) -> bool:
-        return not (self.alternatives or self.is_no_person)
-
 
 def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
     """The readings after every repair that is sure, one after the other.
@@ -394,7 +393,8 @@ def _corrected(stated: Sequence[Hypothesis]) -> _Choice:
     for _ in range(len(now.fits) + 2):
         tried = [now, *others, *now.with_one_more()]
         choice = _surest(tried)
-        if others and not (choice.of is now and choice.is_sure and not now.frame.moved):
+        is_sure = not (choice.alternatives or choice.is_no_person)
+        if others and not (choice.of is now and is_sure and not now.frame.moved):
             choice = _surest([*tried, *(one for o in others for one in o.with_one_more())])
         if choice.of is now:
             break

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from pathlib import Path
 
 import numpy as np
@@ -147,11 +147,6 @@ def without_end(cells: list[str]) -> list[str]:
     return cells[:n]
 
 
-def is_missing(cell: str) -> bool:
-    """Whether it is one of the ways to write that there is no number."""
-    return _MISSING.fullmatch(cell) is not None
-
-
 def number(cell: str) -> float:
     """A cell's number, NaN if it is none or infinite."""
     try:
@@ -159,6 +154,16 @@ def number(cell: str) -> float:
     except ValueError:
         return nan
     return value if isfinite(value) else nan
+
+
+def values_of(cells: list[str]) -> tuple[list[float], list[str]]:
+    """The numbers of cells, NaN or infinite where one is missing, and those that are words."""
+    try:
+        return list(map(float, cells)), []
+    except ValueError:
+        values = list(map(number, cells))
+    pairs = zip(cells, values, strict=True)
+    return values, [cell for cell, x in pairs if isnan(x) and not _MISSING.fullmatch(cell)]
 
 
 class LastDigit:
@@ -250,20 +255,15 @@ class Grid:
     def from_time(self, first_s: float) -> Grid:
         """The same, beginning at another time."""
         shift_s = first_s - self.time_s[0]
-        samples_s = self.samples_s + shift_s
-        is_even = self.samples_s is self.time_s
-        time_s = samples_s if is_even else self.time_s + shift_s
-        return replace(self, time_s=time_s, samples_s=samples_s)
+        return replace(self, time_s=self.time_s + shift_s, samples_s=self.samples_s + shift_s)
 
 
-def in_seconds(
-    stamps: Stamps, rates_hz: Sequence[float]
-) -> tuple[Stamps | None, tuple[Finding, ...]]:
+def in_seconds(stamps: Stamps, rates_hz: Sequence[float], findings: list[Finding]) -> Stamps | None:
     """Stamps in seconds, where they are written in ms, microseconds or as numbers of frames.
 
     ``rates_hz`` are the rates that the file states, the likeliest first. What gives a stated rate
     is taken; else seconds, unless they were more than any recording's steps. None: they count
-    frames, and no rate is stated.
+    frames, and no rate is stated. What is done is added to ``findings``.
     """
     step = stamps.step()
     stated = [rate for rate in rates_hz if np.isfinite(rate) and rate > 0]
@@ -273,40 +273,37 @@ def in_seconds(
     for name, size in (sizes | counts).items() if stated else ():
         room_s = max(_AGREE / stated[0], stamps.digits[1] * size / 2)
         if abs(step * size - 1 / stated[0]) <= room_s:
-            return _as_unit(stamps, name, size)
+            return _as_unit(stamps, name, size, findings)
     if not step >= _LONGEST_STEP_S:
-        return stamps, ()
+        return stamps
     if stamps.count():
-        return (_as_unit(stamps, stated[0], 1 / stated[0])) if stated else (None, ())
-    for name, size in UNITS_S.items():
-        if step * size < _LONGEST_STEP_S:
-            return _as_unit(stamps, name, size)
-    return stamps, ()
+        return _as_unit(stamps, stated[0], 1 / stated[0], findings) if stated else None
+    name = next((name for name, size in UNITS_S.items() if step * size < _LONGEST_STEP_S), "s")
+    return _as_unit(stamps, name, UNITS_S.get(name, 1.0), findings)
 
 
-def counted(stamps: Stamps, rates_hz: Sequence[float]) -> tuple[Stamps, tuple[Finding, ...]]:
-    """Times from the first stated rate, where all stamps (n,) are alike."""
+def counted(stamps: Stamps, rates_hz: Sequence[float], findings: list[Finding]) -> Stamps:
+    """Times from the first stated rate, where all stamps (n,) are alike, and that is said."""
     rate_hz = next((rate for rate in rates_hz if np.isfinite(rate) and rate > 0), 0.0)
     if not rate_hz or len(stamps.values) < 2 or (stamps.values != stamps.values[0]).any():
-        return stamps, ()
+        return stamps
     found = f"all {len(stamps.values)} time stamps are {stamps.values[0]:g}"
     action = f"took {rate_hz:g} Hz, as the header says, and its number of frames"
-    finding = Finding("time", "", found, "increasing times", action, "warning")
-    return Stamps(np.arange(len(stamps.values)) / rate_hz), (finding,)
+    findings.append(Finding("time", "", found, "increasing times", action, "warning"))
+    return Stamps(np.arange(len(stamps.values)) / rate_hz)
 
 
-def _as_unit(
-    stamps: Stamps, name: str | float, size_s: float
-) -> tuple[Stamps, tuple[Finding, ...]]:
+def _as_unit(stamps: Stamps, name: str | float, size_s: float, findings: list[Finding]) -> Stamps:
     """In seconds, and what was done; a rate as name: they count frames."""
     if name == "s":
-        return stamps, ()
+        return stamps
     if isinstance(name, str):
-        return stamps.times(size_s), (about_unit(f"in {name}", f"read them in {name}"),)
+        findings.append(about_unit(f"in {name}", f"read them in {name}"))
+        return stamps.times(size_s)
     first = float(stamps.values[0] >= 1)  # frames counted from 1 begin at 0 s
     action = f"took frame {first:g} as 0 s and {name:g} Hz"
-    times = replace(stamps.times(size_s, first), digits=(0.0, 0.0), unit=FRAMES)
-    return times, (about_unit("that count frames", action),)
+    findings.append(about_unit("that count frames", action))
+    return replace(stamps.times(size_s, first), digits=(0.0, 0.0), unit=FRAMES)
 
 
 def about_unit(found: str, action: str, what: str = "time stamps") -> Finding:
@@ -331,23 +328,21 @@ def even_grid(
     start, stop = _longest_stretch(steps, step_s, stamps.digits[1])
     if stop - start < 2:
         return None
-    findings = []
+    findings: list[Finding] = []
     if stop - start < len(stamps.values):
         found = f"time stamps with a step of {steps.max():.3g} s (least {steps.min():.3g} s)"
         expected = f"even steps of {np.median(steps):.4g} s"
         action = f"kept the longest stretch, samples {start + 1} to {stop} of {len(steps) + 1}"
         findings.append(Finding("time", "", found, expected, action, "warning"))
     kept = replace(stamps, values=stamps.values[start:stop])
-    rate_hz, first_s = _printed_rate(kept, rates_hz, base_hz) or (0.0, 0.0)
-    if rate_hz:
-        time_s = first_s + np.arange(stop - start) / rate_hz
-        samples_s = time_s
-    elif not np.median(np.diff(kept.values)) > 0:
+    samples_s = kept.values
+    if (printed := _printed_rate(kept, rates_hz, base_hz)) is not None:
+        rate_hz, first_s = printed
+        time_s = samples_s = first_s + np.arange(stop - start) / rate_hz
+    elif not np.median(np.diff(samples_s)) > 0:
         return None
     else:
-        rate_hz, time_s, about = _uneven_times(kept.values, stated_hz)
-        findings += about
-        samples_s = kept.values
+        rate_hz, time_s = _uneven_times(samples_s, stated_hz, findings)
     if len(time_s) > _JUMP * len(samples_s) + 1 or rate_hz > MOST_HZ:
         return None
     if np.isfinite(stated_hz) and abs(rate_hz / stated_hz - 1) > _AGREE * _NEAR:
@@ -364,10 +359,7 @@ def onto_grid(grid: Grid, values: np.ndarray, time_s: np.ndarray | None = None) 
     beside a NaN become NaN.
     """
     values, stamps_s = values[grid.samples], grid.samples_s
-    if time_s is None:
-        if stamps_s is grid.time_s:
-            return values
-        time_s = grid.time_s
+    time_s = grid.time_s if time_s is None else time_s
     nearest = np.clip(np.searchsorted(stamps_s, time_s), 1, len(stamps_s) - 1)
     left_is_nearer = time_s - stamps_s[nearest - 1] < stamps_s[nearest] - time_s
     nearest = nearest - left_is_nearer
@@ -397,20 +389,17 @@ def _printed_rate(
             continue  # hardly a step in all of it
         for rate_hz in chain(rates_hz, _simple_rates(stamps_s, room, base_hz)):
             if rate_hz > 0 and _spread(stamps_s, 1 / rate_hz) <= room:
-                return float(rate_hz), _first(stamps_s, rate_hz, room)
+                own = stamps_s - np.arange(len(stamps_s)) / rate_hz
+                # The first stamp, unless half a digit of the others forbids.
+                low, high = own.max() - room / 2, own.min() + room / 2
+                first = np.clip(stamps_s[0], low, high) if low <= high else own.mean()
+                return float(rate_hz), float(first)
     return None
 
 
 def _spread(stamps_s: np.ndarray, period_s: float) -> float:
     """By how much the stamps leave even times of this period."""
     return float(np.ptp(stamps_s - np.arange(len(stamps_s)) * period_s))
-
-
-def _first(stamps_s: np.ndarray, rate_hz: float, room_s: float) -> float:
-    """The first of the even times: the first stamp, unless half a digit of the others forbids."""
-    own = stamps_s - np.arange(len(stamps_s)) / rate_hz
-    low, high = own.max() - room_s / 2, own.min() + room_s / 2
-    return float(np.clip(stamps_s[0], low, high)) if low <= high else float(own.mean())
 
 
 def _simple_rates(stamps_s: np.ndarray, room_s: float, base_hz: float) -> Iterator[float]:
@@ -433,12 +422,21 @@ def _simple_rates(stamps_s: np.ndarray, room_s: float, base_hz: float) -> Iterat
 
 
 def _uneven_times(
-    stamps_s: np.ndarray, stated_hz: float
-) -> tuple[float, np.ndarray, list[Finding]]:
-    """Rate and even times of stamps with jitter, and what is said of it."""
-    findings = []
+    stamps_s: np.ndarray, stated_hz: float, findings: list[Finding]
+) -> tuple[float, np.ndarray]:
+    """Rate and even times of stamps with jitter, and what is said of it.
+
+    The stated rate if the stamps agree within 1 %, else their own.
+    """
     steps = np.diff(stamps_s)
-    rate_hz = _rate(steps, stated_hz)
+    rate_hz = 1 / float(np.median(steps))
+    if stated_hz > 0 and abs(rate_hz / stated_hz - 1) < _NEAR:
+        rate_hz = stated_hz
+    else:
+        if np.ptp(steps) < np.median(steps):
+            rate_hz = 1 / float(np.mean(steps))
+        if abs(rate_hz - round(rate_hz)) < 1e-4 * rate_hz:
+            rate_hz = float(round(rate_hz))
     jitter = np.abs(stamps_s - stamps_s[0] - np.arange(len(stamps_s)) / rate_hz).max() * rate_hz
     if jitter > _JITTER:
         rate_hz = float(1 / np.median(steps))
@@ -448,16 +446,7 @@ def _uneven_times(
         findings.append(Finding("time", "", found, "even steps", action, "corrected"))
     n = int(np.floor((stamps_s[-1] - stamps_s[0]) * rate_hz + _SAME)) + 1
     most = int(_JUMP * len(stamps_s)) + 2  # one more than `even_grid` allows
-    return rate_hz, stamps_s[0] + np.arange(min(n, most)) / rate_hz, findings
-
-
-def _rate(steps: np.ndarray, stated_rate_hz: float) -> float:
-    """The stated rate if the stamps agree within 1 %, else the stamps' own."""
-    own = 1 / float(np.median(steps))
-    if stated_rate_hz > 0 and abs(own / stated_rate_hz - 1) < _NEAR:
-        return stated_rate_hz
-    own = 1 / float(np.mean(steps)) if np.ptp(steps) < np.median(steps) else own
-    return float(round(own)) if abs(own - round(own)) < 1e-4 * own else own
+    return rate_hz, stamps_s[0] + np.arange(min(n, most)) / rate_hz
 
 
 def _longest_stretch(steps: np.ndarray, step_s: float, digit_s: float) -> tuple[int, int]:

@@ -22,12 +22,12 @@ from bsip_cli.recordings.text_tables import (
     check_names,
     dialect_of,
     head_of,
-    is_missing,
     number,
     parted,
     row_counts,
     separator_of,
     text_lines,
+    values_of,
     without_end,
 )
 
@@ -59,7 +59,9 @@ def read_trc(path: Path) -> Trc:
     names, apart = _names(heading, mark)
     check_names([name for name in names if name], "labels", path)
     below = next(lines, "")  # X1, Y1, Z1, X2, ..., or a row where that line is left out
-    lines = chain([below] if _begins_a_row(below) else [], lines)
+    frame_and_time = [_number(cell) for cell in below.split()[:2]]
+    is_row = len(frame_and_time) == 2 and np.isfinite(frame_and_time).all()
+    lines = chain([below] if is_row else [], lines)
     first = list(islice((line for line in lines if line.strip()), ROWS_LOOKED_AT))
     are_counted = apart > 0 and len(below.split()) == 3 * len(names)
     rows = _Rows(names, apart, are_counted, dialect_of(mark, first), path)
@@ -83,12 +85,6 @@ def read_trc(path: Path) -> Trc:
     stamps = Stamps(times, rows.time_digits.sizes(times))
     counts_frames = rows.are_numbered and n_frames == len(times)
     return Trc(labels, stamps, positions, tuple(rates), counts_frames, findings)
-
-
-def _begins_a_row(line: str) -> bool:
-    """With a frame and a time."""
-    cells = line.split()[:2]
-    return len(cells) == 2 and bool(np.isfinite([_number(cell) for cell in cells]).all())
 
 
 def _names(line: str, mark: str | None) -> tuple[list[str], int]:
@@ -184,13 +180,14 @@ class _Rows:
         if len(cells) < 2 or (len(cells) - 2) % 3:
             raise self.misfit(len(cells))
         self.widest = max(self.widest, len(cells))
-        row, words = _numbers(cells)
-        self.are_numbered &= not self.times or row[0] == self._frame + 1
-        self._frame = row[0]
+        frame, time = map(number, cells[:2])
+        positions, words = values_of(cells[2:])
+        self.are_numbered &= not self.times or frame == self._frame + 1
+        self._frame = frame
         self.time_digits.add(cells[1])
-        self.times.append(row[1])
-        self.positions.extend(row[2:])
-        self.widths.append(len(row) - 2)
+        self.times.append(time)
+        self.positions.extend(positions)
+        self.widths.append(len(positions))
         if words:
             self.n_words += len(words)
             self.a_word = self.a_word or words[0]
@@ -254,13 +251,3 @@ def _whole(cells: list[str]) -> list[str]:
     """Without the empty cells behind the last marker that has a cell with something in it."""
     n = len(without_end(cells))
     return cells[: n + (2 - n) % 3 if n > 2 else n]
-
-
-def _numbers(cells: list[str]) -> tuple[list[float], list[str]]:
-    """A row's values, and those of its cells behind the time that are words."""
-    try:
-        return list(map(float, cells)), []
-    except ValueError:
-        row = list(map(number, cells))
-    positions = zip(cells[2:], row[2:], strict=True)
-    return row, [cell for cell, x in positions if np.isnan(x) and not is_missing(cell)]

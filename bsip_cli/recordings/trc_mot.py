@@ -53,31 +53,38 @@ def open_trc_mot(path: Path, written: Written = AS_WRITTEN) -> Opened:
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up, up_of_forces = _ups(trc, positions, mot)
     rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
-    read = _forces(mot, of_forces, times, most, written.force_pace)
+    findings = [*trc.findings, *findings, *_about_ups(up, up_of_forces)]
+    sources: tuple[ForceOnPoint, ...] = ()
+    rate_hz, lengths, note = times.rate_hz, None, ""
+    try:
+        paced = mot and replace(mot, stamps=mot.stamps.faster(written.force_pace))
+        rate_hz, sources, lengths = _forces(paced, of_forces, times, most, findings)
+    except _NoForcesError as why:
+        note = str(why)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
         labels=trc.labels,
         markers_m=positions @ rotation.T,
-        analog_rate_hz=read.rate_hz,
+        analog_rate_hz=rate_hz,
         plates=(),
-        findings=(*trc.findings, *findings, *_about_ups(up, up_of_forces), *read.findings),
+        findings=tuple(findings),
         rotation_world_lab=rotation,
-        forces_note=read.note,
+        forces_note=note,
         time0_s=times.first_s,
     )
-    return Opened(recording, read.sources, read.lengths, partial(open_trc_mot, path))
+    return Opened(recording, sources, lengths, partial(open_trc_mot, path))
 
 
-def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple[Finding, ...]]:
+def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, list[Finding]]:
     """Times, positions (n, n_markers, 3) at these even times, and what was done."""
     if len(trc.stamps.values) < 2:
         found, expected = f"{len(trc.stamps.values)} frame", "at least 2 frames with times"
         raise refusal(path, found, expected, "export the whole trial")
-    stamps, findings = in_seconds(trc.stamps, trc.rates_hz)
+    findings: list[Finding] = []
+    stamps = in_seconds(trc.stamps, trc.rates_hz, findings)
     if stamps is not None and trc.counts_frames:
-        stamps, about = counted(stamps, trc.rates_hz)
-        findings += about
+        stamps = counted(stamps, trc.rates_hz, findings)
     if stamps is None:
         found, remedy = "times that count frames, and no DataRate", "export the trial with its rate"
         raise refusal(path, found, "times in s, or the rate in the header", remedy)
@@ -88,7 +95,7 @@ def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple
     unsure_s = float(np.ptp(stamps.values[grid.samples] - grid.samples_s))
     first_s, unsure_s = float(grid.time_s[0]), np.inf if stamps.unit == FRAMES else unsure_s
     times = _MarkerTimes(first_s, grid.rate_hz, len(grid.time_s), unsure_s)
-    return times, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
+    return times, onto_grid(grid, trc.positions_m), [*findings, *grid.findings]
 
 
 def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, scene.Up]:
@@ -107,30 +114,27 @@ def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, 
             mean = np.abs(force[loaded]).mean(axis=0)
             of_forces = scene.Up(int(np.argmax(mean)), 1, "the forces point there")
             if by_labels and {by_labels.axis, of_forces.axis} == {1, 2}:
-                feet_m = _feet(trc.labels, positions_m) @ scene.rotation_to_z_up(by_labels).T
-                points_m = on_floor / _MM @ scene.rotation_to_z_up(of_forces).T
-                if _lie_below(points_m, feet_m):
+                by_segment = scene.by_segment(
+                    trc.labels, positions_m @ scene.rotation_to_z_up(by_labels).T
+                )
+                feet = [by_segment[name] for name in ("foot_l", "foot_r") if name in by_segment]
+                if _lie_below(on_floor / _MM @ scene.rotation_to_z_up(of_forces).T, feet):
                     return by_labels, of_forces
             surface = scene.up_from_surface(mean[None], on_floor, trc.positions_m)
     up = surface or by_labels or scene.Up(1, 1, "the convention of TRC files")
     return up, up
 
 
-def _feet(labels: tuple[str, ...], positions_m: np.ndarray) -> np.ndarray:
-    """Every place of every marker of the feet, (n, 3)."""
-    by_segment = scene.by_segment(labels, positions_m)
-    feet = [by_segment[foot].reshape(-1, 3) for foot in ("foot_l", "foot_r") if foot in by_segment]
-    every = np.concatenate(feet or [np.zeros((0, 3))])
-    return every[np.isfinite(every).all(axis=1)]
-
-
-def _lie_below(points_m: np.ndarray, feet_m: np.ndarray) -> bool:
+def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     """Whether points of force (n, 3), in m or, where no laboratory is so large, in cm or mm, lie
-    where the feet are seen, in axes turned by some right angle about the vertical."""
+    where markers of the feet (n_frames, k, 3) are seen, in axes turned by some right angle about
+    the vertical."""
+    seen = np.concatenate([np.zeros((0, 3)), *(foot.reshape(-1, 3) for foot in feet_m)])
+    seen = seen[np.isfinite(seen).all(axis=1)]
     points = points_m[np.isfinite(points_m).all(axis=1), :2] @ np.array([1.0, 1j])
-    if not len(points) or not len(feet_m):
+    if not len(points) or not len(seen):
         return False
-    near = cKDTree(feet_m[:, :2])
+    near = cKDTree(seen[:, :2])
     sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
     turned = (points * size * 1j**quarter for size in sizes for quarter in range(4))
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
@@ -145,47 +149,34 @@ def _about_ups(up: scene.Up, of_forces: scene.Up) -> list[Finding]:
     return [Finding("up_axis", "forces", found, "one laboratory frame", action, "corrected")]
 
 
-@dataclass(frozen=True, eq=False)
-class _Forces:
-    """As written, on the markers' time; ``note``: why there are none."""
-
-    rate_hz: float
-    sources: tuple[ForceOnPoint, ...] = ()
-    lengths: Lengths | None = None
-    note: str = ""
-    findings: tuple[Finding, ...] = ()
+class _NoForcesError(Exception):
+    """Why a table gives no forces."""
 
 
 def _forces(
-    mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int, pace: float
-) -> _Forces:
+    mot: Mot | None,
+    rotation: np.ndarray,
+    markers: _MarkerTimes,
+    most_values: int,
+    findings: list[Finding],
+) -> tuple[float, tuple[ForceOnPoint, ...], Lengths]:
+    """Rate, forces as written on the markers' time, and how long they last; adds what is said."""
     if mot is None:
-        return _Forces(markers.rate_hz, note="no .mot file of the same name next to the .trc")
-    if note := _unplaced(mot):
-        return _Forces(markers.rate_hz, note=note, findings=mot.findings)
-    decided, grid = _force_times(mot.stamps.faster(pace), markers), None
-    findings = [*mot.findings, *decided.findings]
-    if decided.stamps is not None:
-        grid = even_grid(decided.stamps, decided.rates_hz, markers.rate_hz)
-        if grid is not None and decided.is_simultaneous:
-            torn_off_s = grid.time_s[0] - decided.stamps.values[0] if grid.samples.start else 0.0
-            grid = grid.from_time(markers.first_s + torn_off_s)
-    if grid is None:
-        note = decided.note or _UNEVEN
-        return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
+        raise _NoForcesError("no .mot file of the same name next to the .trc")
+    findings += mot.findings
+    _check_placed(mot)
+    grid = _force_grid(mot.stamps, markers, findings)
     last = markers.lasts_s() * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
         rows = len(mot.stamps.values)
-        note = f"the .mot has {rows} rows and {last:.3g} would be needed for the .trc"
-        return _Forces(markers.rate_hz, note=note, findings=tuple(findings))
+        needed = f"the .mot has {rows} rows and {last:.3g} would be needed for the .trc"
+        raise _NoForcesError(needed)
     samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
-    read = [_source(force, grid, samples_s, rotation, markers) for force in mot.forces]
-    findings += [*grid.findings, *_about_missing(mot), *(one for _, found in read for one in found)]
-    sources = tuple(source for source, _ in read)
+    findings += [*grid.findings, *_about_missing(mot)]
+    sources = [_source(one, grid, samples_s, rotation, markers, findings) for one in mot.forces]
     forces_s = float(grid.time_s[-1] - grid.time_s[0])
     step_s = max(1 / grid.rate_hz, 1 / markers.rate_hz)
-    lengths = Lengths(markers.lasts_s(), forces_s, step_s)
-    return _Forces(grid.rate_hz, sources, lengths, findings=tuple(findings))
+    return grid.rate_hz, tuple(sources), Lengths(markers.lasts_s(), forces_s, step_s)
 
 
 def _source(
@@ -194,9 +185,10 @@ def _source(
     samples_s: np.ndarray,
     rotation: np.ndarray,
     markers: _MarkerTimes,
-) -> tuple[ForceOnPoint, list[Finding]]:
-    """One force on the markers' time, with its faulty samples marked; points and moments in the
-    unit that the file names, as written where it names none that is known."""
+    findings: list[Finding],
+) -> ForceOnPoint:
+    """One force on the markers' time, with its faulty samples marked, and said; points and moments
+    in the unit that the file names, as written where it names none that is known."""
     point, moment = force.point, force.moment
     if point is not None:
         point = point * (length_in_m(force.point_unit) or 1.0)
@@ -229,23 +221,24 @@ def _source(
         f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
     )
     none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
-    return replace(source, known=samples.usable()), [
+    findings += [
         replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
         for one in sample_findings(force.name, samples, grid.rate_hz)
     ]
+    return replace(source, known=samples.usable())
 
 
-def _unplaced(mot: Mot) -> str:
-    """Why the forces have no centre of pressure, or nothing."""
-    bare = [f.name for f in mot.forces if f.point is None and f.moment is None]
-    bare = [name for name in bare if np.nan_to_num(mot.forces[int(name) - 1].force_N).any()]
-    if not bare:
-        return ""
-    which = "" if len(bare) == len(mot.forces) else f" {' and '.join(bare)}"
-    return (
-        f"the .mot has no columns for the point and none for the moment of its forces{which}, "
-        "and without them no centre of pressure is known"
-    )
+def _check_placed(mot: Mot) -> None:
+    """Whether the forces have a centre of pressure."""
+    bare = [f for f in mot.forces if f.point is None and f.moment is None]
+    bare = [force for force in bare if np.nan_to_num(force.force_N).any()]
+    if bare:
+        names = " and ".join(force.name for force in bare)
+        which = "" if len(bare) == len(mot.forces) else f" {names}"
+        raise _NoForcesError(
+            f"the .mot has no columns for the point and none for the moment of its forces{which}, "
+            "and without them no centre of pressure is known"
+        )
 
 
 def _about_missing(mot: Mot) -> list[Finding]:
@@ -286,70 +279,72 @@ class _MarkerTimes:
         return _span(self.first_s, self.first_s + self.lasts_s())
 
 
-@dataclass(frozen=True, eq=False)
-class _ForceTimes:
-    """Stamps in seconds of the markers' clock, or why there are none."""
-
-    stamps: Stamps | None
-    findings: tuple[Finding, ...] = ()
-    note: str = ""
-    rates_hz: tuple[float, ...] = ()  # known otherwise than by the stamps
-    is_simultaneous: bool = False  # they begin with the markers, whatever the stamps say
-
-
-def _force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
-    """Unit and zero of the forces' times.
-
-    Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
-    count rows have the rate that makes a whole number of rows per frame. Forces that begin at
-    another time than the markers but last as long were counted from another zero.
-    """
+def _force_grid(stamps: Stamps, markers: _MarkerTimes, findings: list[Finding]) -> Grid:
+    """The forces' times in seconds of the markers' clock, on an even grid."""
     with np.errstate(over="ignore", invalid="ignore"):
         increase = np.isfinite(stamps.values).all() and stamps.step() > 0
     if len(stamps.values) < 2 or not increase:
-        return _ForceTimes(None, (), _UNEVEN)
-    decided = _in_seconds(stamps, markers)
-    if decided.stamps is None or decided.is_simultaneous:
-        return decided
-    return _from_one_zero(decided, markers)
+        raise _NoForcesError(_UNEVEN)
+    stamps, rates_hz = _in_seconds(stamps, markers, findings)
+    is_simultaneous = bool(rates_hz) or _begin_together(stamps, markers, findings)
+    grid = even_grid(stamps, rates_hz, markers.rate_hz)
+    if grid is None:
+        raise _NoForcesError(_UNEVEN)
+    if not is_simultaneous:
+        return grid
+    torn_off_s = grid.time_s[0] - stamps.values[0] if grid.samples.start else 0.0
+    return grid.from_time(markers.first_s + torn_off_s)
 
 
-def _in_seconds(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
-    step, n, near_s = stamps.step(), len(stamps.values), 1 / markers.rate_hz
-    stated_s = _UNIT_NAMES.get(stamps.unit.strip().lower())
+def _in_seconds(
+    stamps: Stamps, markers: _MarkerTimes, findings: list[Finding]
+) -> tuple[Stamps, tuple[float, ...]]:
+    """And the rate of stamps that count rows, the first at the first frame.
+
+    Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
+    count rows have the rate that makes a whole number of rows per frame.
+    """
+    step, n, unit = stamps.step(), len(stamps.values), stamps.unit.strip()
+    stated_s = _UNIT_NAMES.get(unit.lower())
     if stated_s is not None and stated_s != 1.0:
-        found = f"in {stamps.unit.strip()}"
-        return _ForceTimes(stamps.times(stated_s), (about_unit(found, "read them so", _WHAT),))
+        findings.append(about_unit(f"in {unit}", "read them so", _WHAT))
+        return stamps.times(stated_s), ()
     if stamps.count():
         ratio = round(n / markers.n)
         if ratio >= 1 and abs(n - ratio * markers.n) <= ratio:
             rate_hz = ratio * markers.rate_hz
             action = f"took the first as the first frame's and {rate_hz:g} Hz"
-            own = replace(stamps.times(1 / rate_hz, float(stamps.values[0])), digits=(0.0, 0.0))
-            said = about_unit("that count rows", action, _WHAT)
-            return _ForceTimes(own, (said,), rates_hz=(rate_hz,), is_simultaneous=True)
-        if stamps.values[0] < 2 or abs(stamps.values[0] / 1e3 - markers.first_s) > near_s:
+            findings.append(about_unit("that count rows", action, _WHAT))
+            own = stamps.times(1 / rate_hz, float(stamps.values[0]))
+            return replace(own, digits=(0.0, 0.0)), (rate_hz,)
+        late_s = abs(stamps.values[0] / 1e3 - markers.first_s)
+        if stamps.values[0] < 2 or late_s > 1 / markers.rate_hz:
             note = f"the times of the .mot count {n} rows, and none of its rates has as many in "
-            return _ForceTimes(None, (), f"{note}the {markers.n} frames of the markers")
+            raise _NoForcesError(f"{note}the {markers.n} frames of the markers")
     lasts = abs(float(stamps.values[-1] - stamps.values[0]))
     sizes = {"s": 1.0, **UNITS_S}
     possible = {name: size for name, size in sizes.items() if step * size * MOST_HZ >= 1}
     if not possible:
-        return _ForceTimes(None, (), _UNEVEN)
+        raise _NoForcesError(_UNEVEN)
     name = min(possible, key=lambda unit: abs(np.log(lasts * possible[unit] / markers.lasts_s())))
     if name == "s":
-        return _ForceTimes(stamps)
-    said = about_unit(f"in {name}: {step:.4g} from row to row", f"read them in {name}", _WHAT)
-    return _ForceTimes(stamps.times(possible[name]), (said,))
+        return stamps, ()
+    findings.append(
+        about_unit(f"in {name}: {step:.4g} from row to row", f"read them in {name}", _WHAT)
+    )
+    return stamps.times(possible[name]), ()
 
 
-def _from_one_zero(decided: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
-    """Both clocks zeroed alike where nothing else can be; a note where they share no time."""
-    assert decided.stamps is not None
-    times = decided.stamps.values
+def _begin_together(stamps: Stamps, markers: _MarkerTimes, findings: list[Finding]) -> bool:
+    """Whether the forces begin with the markers, whatever the stamps say.
+
+    Forces that begin at another time than the markers but last as long were counted from another
+    zero. There are none where they share no time otherwise.
+    """
+    times = stamps.values
     first, last = float(times.min()), float(times.max())
-    near = 1 / markers.rate_hz + decided.stamps.step()
-    is_as_long = abs((last - first) - markers.lasts_s()) <= near + decided.stamps.digits[1]
+    near = 1 / markers.rate_hz + stamps.step()
+    is_as_long = abs((last - first) - markers.lasts_s()) <= near + stamps.digits[1]
     apart_s = abs(first - markers.first_s)
     overlap_s = min(last, markers.first_s + markers.lasts_s()) - max(first, markers.first_s)
     is_together = overlap_s > min(near, 0.5 * (last - first))
@@ -359,7 +354,7 @@ def _from_one_zero(decided: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
     # Clocks that were started apart do not stop after the same time: both files were cut alike.
     if is_as_long and not (is_together and markers.unsure_s < apart_s <= near):
         if apart_s <= (markers.unsure_s if is_together and not counts_frames else near):
-            return replace(decided, is_simultaneous=True)  # within what is printed
+            return True  # within what is printed
         if counts_frames and is_together:
             found += ": as long, and those count frames"
         elif is_together:
@@ -368,15 +363,14 @@ def _from_one_zero(decided: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
         else:
             found += ": as long, and never at once"
     elif not is_together:
-        return replace(decided, stamps=None, note=found)
+        raise _NoForcesError(found)
     elif counts_frames and apart_s > near:
         found, level = f"{found}: perhaps from another zero", "warning"
         action = "took both as written; if they were cut alike, give them the same first time"
     else:
-        return decided
-    said = Finding("time", "", found, "one clock", action, level)
-    findings = (*decided.findings, said)
-    return replace(decided, is_simultaneous=is_as_long, findings=findings)
+        return False
+    findings.append(Finding("time", "", found, "one clock", action, level))
+    return is_as_long
 
 
 def _span(first_s: float, last_s: float) -> str:

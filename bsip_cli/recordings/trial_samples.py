@@ -44,7 +44,12 @@ sees it along the simulation."""
 
 _MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
+# Logarithm, of one step of lags a second away: tenths of a second are as frequent as whole ones.
+_LOG_PRIOR = DELAYED + float(np.log(_STEP_S / 2 / np.log(_MOST_S / LEAST_S)))
 _NEAR_S = 0.1  # lags so near are one
+# Of a clock that runs otherwise, or of a table that lost rows and was numbered anew: what forces
+# come later or earlier by at a trial's end, up to that share of it (more is another rate, `PACES`).
+_DRIFT_STEP_S, _MOST_DRIFT_S, _DRIFT_SHARE = 0.1, 2.0, 0.15
 
 
 @dataclass(frozen=True)
@@ -61,15 +66,13 @@ class Delay:
         return replace(usual, independent_numbers=self.kept * usual.independent_numbers)
 
 
-NO_DELAY = Delay()
-
-
 @dataclass(frozen=True, eq=False)
 class Lags:
     """How well forces go with the body if they are taken from later, logarithm, (n,) each: as the
     file says; the force alone, turned or mirrored as suits it best; and the lift alone, which no
     unit, reference point or order of corners changes. kept : see `Delay`. ``path_m`` : of the
-    centre of mass in each step."""
+    centre of mass in each step. ``drift_s`` : by what forces surely come later at the trial's end
+    than at its start, where they come with the motion; 0 if that is not sure."""
 
     seconds: np.ndarray
     kept: np.ndarray
@@ -77,19 +80,16 @@ class Lags:
     of_force: np.ndarray
     of_lift: np.ndarray
     path_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    drift_s: float = 0.0
 
-    def steps_s(self) -> np.ndarray:
-        """When the centre of mass is where the path has it, (m,)."""
-        return (self.seconds[1] - self.seconds[0]) * np.arange(len(self.path_m))
-
-    def _now(self) -> np.ndarray:
-        """(3,) of each kind at the stated times, nearly."""
-        every = np.array([self.as_stated, self.of_force, self.of_lift])
-        return np.asarray(every[:, np.abs(self.seconds) <= LEAST_S].max(axis=1).clip(min=0.0))
+    def _now(self, kind: np.ndarray) -> np.ndarray:
+        """Of a kind (..., n) at the stated times, nearly, (...,)."""
+        now = np.abs(self.seconds) <= LEAST_S
+        return np.asarray(kind[..., now].max(axis=-1).clip(min=0.0))
 
     def goes(self) -> float:
         """How well forces go with the body at the stated times, in whatever axes and units."""
-        return float(self._now()[1])
+        return float(self._now(self.of_force))
 
     def delays(self, limits: GateLimits = USUAL) -> list[Delay]:
         """None, and all that are not surely others if any surely is better: who moves in cycles
@@ -99,7 +99,7 @@ class Lags:
         surely = -float(np.log(1 - limits.corrected_percent / 100))
         every = np.array([self.as_stated, self.of_force, self.of_lift])
         highest = every.max(axis=1)
-        if not (highest > self._now() + surely).any():
+        if not (highest > self._now(every) + surely).any():
             return [none]
         least = (highest - surely).clip(min=surely)[:, None]
         may_be, likelier = (every >= least).any(axis=0), every[:2].max(axis=0)
@@ -110,14 +110,9 @@ class Lags:
             aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
             delay_s = float(self.seconds[k] + aside * (self.seconds[k + 1] - self.seconds[k]))
             if may_be[k] and abs(delay_s) > LEAST_S:
-                found.append(Delay(delay_s, self.kept[k], _log_prior(delay_s) + self.of_lift[k]))
+                rare = _LOG_PRIOR - float(np.log(abs(delay_s)))
+                found.append(Delay(delay_s, self.kept[k], rare + self.of_lift[k]))
         return found
-
-
-def _log_prior(delay_s: float) -> float:
-    """Of one step of lags there: tenths of a second are as frequent as whole ones."""
-    both_ways = 2 * float(np.log(_MOST_S / LEAST_S))
-    return DELAYED + float(np.log(_STEP_S / abs(delay_s) / both_ways))
 
 
 def surest(logs: Mapping[Delay, float], of_none: float, limits: GateLimits) -> Delay | None:
@@ -149,7 +144,26 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     by = np.arange(-most, most + 1)
     found = [_goes(body, total, k, limits) for k in by.tolist()]
     kept, as_stated, of_force, of_lift = np.array(found).T
-    return Lags(by * step / rate_hz, kept, as_stated, of_force, of_lift, body.place_m)
+    drift_s = _drift_s(body, total, step / rate_hz, float(of_force.max()), limits)
+    return Lags(by * step / rate_hz, kept, as_stated, of_force, of_lift, body.place_m, drift_s)
+
+
+def _drift_s(
+    body: Body, total: np.ndarray, step_s: float, of_delays: float, limits: GateLimits
+) -> float:
+    """As `Lags` has it, of what goes with the body by ``of_delays`` at the best of all lags."""
+    steps = np.arange(len(total))
+    most_s = min(_MOST_DRIFT_S, _DRIFT_SHARE * len(total) * step_s)
+    sizes_s = _DRIFT_STEP_S * np.arange(1, int(most_s / _DRIFT_STEP_S) + 1)
+    drifts_s = [*-sizes_s[::-1], *sizes_s]
+    if not drifts_s:
+        return 0.0
+    by = (np.round(drift / step_s * steps / len(total)).astype(int) for drift in drifts_s)
+    goes = np.array([_goes(body, total, one, limits)[2] for one in by])
+    rare = DELAYED - np.log(len(goes))
+    surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
+    best = int(np.argmax(goes))
+    return float(drifts_s[best]) if goes[best] + rare > of_delays + surely else 0.0
 
 
 def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict[str, np.ndarray]]:
@@ -162,18 +176,19 @@ def motion_and_forces(opened: Opened, step: int) -> tuple[Body, np.ndarray, dict
     samples = np.round(frames * analog_hz / rate_hz).astype(int)
     samples = samples[samples < min(len(source.usable) for source in opened.sources)]
     wrenches = {}
-    repeated = repeated_plates([{one.name: one for one in opened.sources}])
-    for source in opened.sources:
-        if source.name in repeated:
-            continue
-        parts = source.smoothed(SMOOTH_S * analog_hz).at(samples).parts()
-        wrenches[source.name] = parts @ source.matrix(AS_STATED).T
+    smooth = {one.name: one.smoothed(SMOOTH_S * analog_hz).at(samples) for one in opened.sources}
+    repeated = repeated_plates([{one.name: one for one in opened.sources}], [smooth])
+    for name, source in smooth.items():
+        if name not in repeated:
+            wrenches[name] = source.parts() @ source.matrix(AS_STATED).T
     body = Body.of(by_segment(recording.labels, recording.markers_m), rate_hz, frames)
     return body, samples, wrenches
 
 
-def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> tuple[float, ...]:
-    """As `Lags` has it from ``kept`` on."""
+def _goes(
+    body: Body, total: np.ndarray, by: int | np.ndarray, limits: GateLimits
+) -> tuple[float, ...]:
+    """As `Lags` has it from ``kept`` on, each row's force from ``by`` rows later."""
     rows, there = later_samples(len(total), by)
     later = np.where(there[:, None], total[rows], np.nan)
     kept = float(np.isfinite(later).all(axis=1).mean())
@@ -227,7 +242,8 @@ class TrialSamples:
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``mass_kg`` : that the forces of a
     text file carry if they are in N, 0 where that is not known. ``late`` : the same with forces of
-    another ``delay``, of each that may be. ``course`` and ``sizes`` : to compare it with others.
+    another ``delay``, of each that may be. ``drift_s`` : see `Lags`. ``course`` and ``sizes`` : to
+    compare it with others.
     """
 
     name: str
@@ -242,27 +258,38 @@ class TrialSamples:
     body: Body
     lengths: Lengths | None = None
     mass_kg: float = 0.0
-    delay: Delay = NO_DELAY
+    delay: Delay = Delay()
     late: tuple[TrialSamples, ...] = ()
+    drift_s: float = 0.0
     course: Course = field(default_factory=Course)
     sizes: Sizes = field(default_factory=dict)
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
-        stated = replace(cls._of(opened), lengths=opened.lengths, mass_kg=_mass_kg(opened))
         recording = opened.recording
-        stated = replace(stated, sizes=sizes_of(recording.labels, recording.markers_m))
-        found = lags(opened, limits) if stated.sources else None
-        if found is None:
-            return replace(stated, course=Course.of(opened)) if stated.sources else stated
+        stated = replace(
+            cls._of(opened),
+            lengths=opened.lengths,
+            mass_kg=_mass_kg(opened),
+            sizes=sizes_of(recording.labels, recording.markers_m),
+        )
+        if not stated.sources:
+            return stated
+        if (found := lags(opened, limits)) is None:
+            return replace(stated, course=Course.of(opened))
         none, *others = found.delays(limits)
-        course = Course.of(opened, found.steps_s(), found.path_m, found.goes())
-        stated = replace(stated, course=course)
         late = (
             replace(cls._of(opened.with_forces_from(delay.seconds)), delay=delay)
             for delay in others
         )
-        return replace(stated, delay=none, late=tuple(one for one in late if one.sources))
+        steps_s = (found.seconds[1] - found.seconds[0]) * np.arange(len(found.path_m))
+        return replace(
+            stated,
+            course=Course.of(opened, steps_s, found.path_m, found.goes()),
+            drift_s=found.drift_s,
+            delay=none,
+            late=tuple(one for one in late if one.sources),
+        )
 
     @classmethod
     def _of(cls, opened: Opened) -> TrialSamples:

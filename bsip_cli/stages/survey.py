@@ -34,7 +34,8 @@ from bsip_cli.study.study import Trial
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
 _SCALES = ("moment_scales", "point_scales")
-_OF_TRIALS = ("delays_s", "paces", "maybe_paces", "of_others", "twins", "odd", *_SCALES)
+_ODD = ("of_others", "twins", "odd")
+_OF_TRIALS = ("delays_s", "drifts_s", "paces", "maybe_paces", *_ODD, *_SCALES)
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
 _NO_TEST = "what is found in one is no test of the other; remove one of them"

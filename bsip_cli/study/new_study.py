@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,30 +16,34 @@ STILL_M_S = 0.1
 """Mean speed of markers over half a second: people who stand sway by centimetres a second, in slow
 movements the limbs go several times faster."""
 
-_STATIC_NAMES = (
+
+def _set_of(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+_STATIC = _set_of(
     "static statics statisch statique estatico estatica statico statica calib calibration kalib "
     "kalibrierung kalibration calibracion calibrazione calibracao neutral neutre neutro tpose "
     "npose apose anatomical anatomic scal"
 )
 # Words that movements have too, as in sit to stand: these must be still nearly all the time.
-_PERHAPS_STATIC_NAMES = "cal st pose stand standing stehen debout anat reference ref"
-_SEQUENCE_NAMES = "sequence sequenz identification identify excitation"
+_PERHAPS_STATIC = _set_of("cal st pose stand standing stehen debout anat reference ref")
+_SEQUENCE = _set_of("sequence sequenz identification identify excitation")
 # Folders that sort recordings, and name nobody.
-_SORTING_NAMES = (
-    "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
-    "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
-    "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
-    "inputs input output condition cond block task tasks"
+_SORTING = (
+    _STATIC
+    | _PERHAPS_STATIC
+    | _set_of(
+        "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
+        "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
+        "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
+        "inputs input output condition cond block task tasks"
+    )
 )
-_PERSON_NAMES = (
+_PERSONS = _set_of(
     "s sub subj subject p part participant pat patient pt vp pp proband probandid id sujet "
     "sujeto soggetto sbj hc"
 )
-_STATIC, _PERHAPS_STATIC, _SEQUENCE, _PERSONS = (
-    frozenset(names.split())
-    for names in (_STATIC_NAMES, _PERHAPS_STATIC_NAMES, _SEQUENCE_NAMES, _PERSON_NAMES)
-)
-_SORTING = frozenset(_SORTING_NAMES.split()) | _STATIC | _PERHAPS_STATIC
 _LONGEST_TASK = 40  # letters
 _LONGEST_RUN = 4  # digits; longer ones are dates and belong to the name
 _ENOUGH_LABELS = 0.5  # shared, of the recording with fewer: else nothing says that it is one set
@@ -264,7 +268,10 @@ def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Na
 def _static(participant: str, own: Sequence[Found], notes: list[str]) -> list[Found]:
     """Those that calibrate: called so and still; else the stillest, if somebody stands there."""
     called = [one for one in own if _is_called_static(one.stem) or _is_in_static_folder(one)]
-    still = [one for one in called if _is_still(one)]
+    # Words that movements have too must be still nearly all the time.
+    clear = [one for one in called if _is_in_static_folder(one) or _STATIC & {*words(one.stem)}]
+    speeds = {one.path: one.median_m_s if one in clear else one.fastest_m_s for one in called}
+    still = [one for one in called if speeds[one.path] < STILL_M_S]
     moving = [one.path.name for one in called if one not in still]
     if moving:
         notes.append(
@@ -293,11 +300,6 @@ def _only_sorts(folder: str) -> bool:
     letters = [word for word in words(folder) if word.isalpha()]
     is_date = not letters and len(re.sub(r"\D", "", folder)) >= _DATE
     return is_date or (bool(letters) and _SORTING.issuperset(letters))
-
-
-def _is_still(one: Found) -> bool:
-    is_clear = _is_in_static_folder(one) or not _STATIC.isdisjoint(words(one.stem))
-    return (one.median_m_s if is_clear else one.fastest_m_s) < STILL_M_S
 
 
 def is_sequence(task: str) -> bool:
@@ -368,9 +370,3 @@ def words(text: str) -> list[str]:
     split = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", folded)
     whole = re.findall(r"[A-Za-z]+", folded)
     return list(dict.fromkeys(word.lower() for word in (*split, *whole)))
-
-
-def counted(names: Iterable[str]) -> str:
-    """``3 .avi, 1 .vsk``: how many of each kind."""
-    counts = Counter(names)
-    return ", ".join(f"{n} {kind}" for kind, n in sorted(counts.items(), key=lambda p: -p[1]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,11 +11,20 @@ from pathlib import Path
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_bytes
-from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.folders import check_path, entries, is_folder, lies_in
 from bsip_cli.files.regular import fault_of
-from bsip_cli.study.participants import NAME, Participant, Row, participant_of, read_people, rows_of
-from bsip_cli.study.trials import RECORDINGS, Fault, Role, Trial, find_trials, listed, refusals_of
+from bsip_cli.study.participants import NAME, Participant, participant_of, read_people, rows_of
+from bsip_cli.study.trials import (
+    RECORDINGS,
+    Folder,
+    Role,
+    Trial,
+    find_trials,
+    kinds,
+    listed,
+    merged,
+)
 
 __all__ = ["Participant", "Role", "Study", "Trial", "describe_dataset", "load_study", "make_out"]
 
@@ -54,88 +62,40 @@ def load_study(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
     check_path(root)
-    loading = _Loading(root, roles)
-    for row in rows_of(chosen, loading.table) if chosen else loading.table.rows:
-        loading.add(row)
-    if not chosen:
-        loading.look_around({row.id for row in loading.table.rows})
-    study = Study(root, tuple(loading.participants.values()), tuple(loading.all_notes()))
-    return study, loading.refusals
-
-
-class _Loading:
-    """Who is found in a study row by row, and what cannot be used."""
-
-    def __init__(self, root: Path, roles: dict[str, tuple[str, ...]]) -> None:
-        self.root, self.roles = root, roles
-        self.table = read_people(root / "participants.tsv")
-        self.participants: dict[str, Participant] = {}  # by id in small letters
-        self.refusals: list[BadDataError] = []
-        self.notes: list[str] = list(self.table.notes)
-        self.others: list[Path] = []
-        self.spare_forces: list[Path] = []
-
-    def add(self, row: Row) -> None:
-        """A row of participants.tsv, with the folder of that name."""
+    table = read_people(root / "participants.tsv")
+    participants: dict[str, Participant] = {}  # by id in small letters
+    refusals: list[BadDataError] = []
+    notes, found = list(table.notes), []
+    for row in rows_of(chosen, table) if chosen else table.rows:
         try:
-            person = participant_of(row, self.table)
-            if (known := self.participants.get(person.id.casefold())) is not None:
-                other = "" if person.id == known.id else f", in other capitals as {known.id}"
-                raise BadDataError(
-                    f"{person.id} stands twice{other}",
-                    file=self.root / "participants.tsv",
-                    expected="a line per participant; the first one counts",
-                    remedy="remove one",
-                )
-            _check_folder(self.root, person.id)
-            found = find_trials(self.root / person.id, person.id, self.roles)
+            person = participant_of(row, table)
+            _check_folder(root, person.id, participants.get(person.id.casefold()))
+            found.append(find_trials(root / person.id, person.id, roles))
         except BadDataError as refusal:
-            self.refusals.append(refusal)
-            return
-        self.others += found.others
-        self.spare_forces += found.spare_forces
-        self.refusals += found.refusals
-        self.notes += person.notes
-        if found.trials:
-            person = replace(person, trials=tuple(found.trials))
-            self.participants[person.id.casefold()] = person
-
-    def look_around(self, named: set[str]) -> None:
-        """What lies next to the folders of those whom participants.tsv names."""
-        try:
-            paths = entries(self.root)
-        except BadDataError as closed:
-            self.refusals.append(closed)
-            return
-        expected, remedy = "recordings in the folders of participants", "move it there"
-        outside = [path for path in paths if path.suffix.lower() in RECORDINGS]
-        found = "lies in no participant's folder"
-        self.refusals += refusals_of(Fault(path, found, expected, remedy) for path in outside)
-        unnamed = [path for path in paths if NAME.fullmatch(path.name) and path.name not in named]
-        if unnamed:
-            table = self.root / "participants.tsv"
-            self.notes.append(f"{table} does not name {_where(unnamed, self.root)}: not used")
-
-    def all_notes(self) -> Iterator[str]:
-        """What is no recording, in one sentence for each kind."""
-        yield from self.notes
-        folders = [path for path in self.others if is_folder(path)]
-        files = sorted({*self.others} - {*folders})
-        if folders:
-            yield (
-                "folders that are not looked into, since recordings lie in sub-XX and in "
-                f"sub-XX/ses-YY: {_where(folders, self.root)}"
-            )
-        if files:
-            yield f"files that are no recordings and not used: {_kinds(files, self.root)}"
-        if self.spare_forces:
-            yield (
-                "forces that are not used, since those of the C3D of their name are: "
-                f"{_kinds(self.spare_forces, self.root)}"
-            )
+            refusals.append(refusal)
+            continue
+        refusals += found[-1].refusals
+        notes += person.notes
+        if trials := found[-1].trials:
+            participants[person.id.casefold()] = replace(person, trials=tuple(trials))
+    if not chosen:
+        beside, unnamed = _around(root, {row.id for row in table.rows})
+        refusals += beside
+        notes += unnamed
+    notes += _unused(root, found)
+    return Study(root, tuple(participants.values()), tuple(notes)), refusals
 
 
-def _check_folder(root: Path, name: str) -> None:
+def _check_folder(root: Path, name: str, known: Participant | None) -> None:
+    """Refuse a participant without a folder, or who stands in the table twice."""
+    if known is not None:
+        other = "" if name == known.id else f", in other capitals as {known.id}"
+        raise BadDataError(
+            f"{name} stands twice{other}",
+            file=root / "participants.tsv",
+            expected="a line per participant; the first one counts",
+            remedy="remove one",
+        )
     folder = root / name
     if is_folder(folder):
         return
@@ -148,12 +108,50 @@ def _check_folder(root: Path, name: str) -> None:
     )
 
 
-def _kinds(files: Sequence[Path], root: Path) -> str:
-    """Where a few files lie; of more, how many there are of each kind."""
-    if len(files) <= _FEW:
-        return _where(files, root)
-    counts = Counter(path.suffix.lower() or "without an ending" for path in files)
-    return ", ".join(f"{n} {printable(kind)}" for kind, n in counts.most_common())
+def _around(root: Path, named: set[str]) -> tuple[list[BadDataError], list[str]]:
+    """What is refused next to the folders of those whom participants.tsv names, and the folders of
+    people whom it does not name, in words."""
+    try:
+        paths = entries(root)
+    except BadDataError as closed:
+        return [closed], []
+    outside = (
+        BadDataError(
+            "lies in no participant's folder",
+            file=path,
+            expected="recordings in the folders of participants",
+            remedy="move it there",
+        )
+        for path in paths
+        if path.suffix.lower() in RECORDINGS
+    )
+    unnamed = [path for path in paths if NAME.fullmatch(path.name) and path.name not in named]
+    table, where = root / "participants.tsv", _where(unnamed, root)
+    return merged(outside), [f"{table} does not name {where}: not used"] if unnamed else []
+
+
+def _unused(root: Path, found: Sequence[Folder]) -> Iterator[str]:
+    """What is no recording, in one sentence for each kind."""
+    others = [path for one in found for path in one.others]
+    spare_forces = [path for one in found for path in one.spare_forces]
+    folders = [path for path in others if is_folder(path)]
+    files = sorted({*others} - {*folders})
+    if folders:
+        yield (
+            "folders that are not looked into, since recordings lie in sub-XX and in "
+            f"sub-XX/ses-YY: {_where(folders, root)}"
+        )
+    if files:
+        yield f"files that are no recordings and not used: {_told(files, root)}"
+    if spare_forces:
+        yield (
+            "forces that are not used, since those of the C3D of their name are: "
+            f"{_told(spare_forces, root)}"
+        )
+
+
+def _told(files: Sequence[Path], root: Path) -> str:
+    return _where(files, root) if len(files) <= _FEW else kinds(files)
 
 
 def _where(paths: Sequence[Path], root: Path) -> str:

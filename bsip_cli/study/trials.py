@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,6 +26,7 @@ _TRIAL = re.compile(
 )
 _SESSION = re.compile(r"ses-(?P<session>[A-Za-z0-9]+)")
 PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".rar", ".tar", ".tgz")
+_FETCH = "fetch its content with `datalad get` or `git annex get`"
 _NAME_BYTES = 255  # of a file's name, on the file systems of Linux and macOS
 _LONGEST_KIND = max(len(one.file_name) for one in SCHEMAS.values() if one.level == "trial")
 # What an artifact's name has more than the trial's, while it is written; 4194304: the last process.
@@ -50,20 +52,6 @@ class Trial:
         return (self.path, self.forces) if self.forces else (self.path,)
 
 
-@dataclass(frozen=True)
-class Fault:
-    """Why an entry that looks like a recording cannot be used.
-
-    ``alike`` is equal where it can be said of several at once, though ``found`` is not.
-    """
-
-    path: Path
-    found: str
-    expected: str
-    remedy: str
-    alike: str = ""
-
-
 def trial_named(
     participant: str, name: str, path: Path, roles: Mapping[str, tuple[str, ...]]
 ) -> Trial:
@@ -84,19 +72,23 @@ def trial_named(
     return Trial(participant, task, stem, path, named.get(task, "validation"), run)
 
 
-def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:
+def merged(faults: Iterable[BadDataError]) -> list[BadDataError]:
     """One refusal for all entries of a folder that have the same fault."""
-    alike: dict[tuple, list[Fault]] = {}
+    alike: dict[tuple, list[BadDataError]] = {}
     for one in faults:
-        alike.setdefault((one.path.parent, one.alike or one.found, one.remedy), []).append(one)
+        # What was not fetched is said of several at once, wherever their links lead.
+        what = "" if one.remedy == _FETCH else one.found
+        alike.setdefault((Path(one.file).parent, what, one.remedy), []).append(one)
     refusals = []
     for one, *rest in alike.values():
-        likewise = f" (likewise {listed(other.path.name for other in rest)})" if rest else ""
-        found = f"{one.found}{likewise}"
-        refusals.append(
-            BadDataError(found, file=one.path, expected=one.expected, remedy=one.remedy)
-        )
+        names = listed(Path(other.file).name for other in rest)
+        found = f"{one.found} (likewise {names})" if rest else one.found
+        refusals.append(_fault(one.file, found, one.expected, one.remedy))
     return refusals
+
+
+def _fault(path: Path | str, found: str, expected: str, remedy: str) -> BadDataError:
+    return BadDataError(found, file=path, expected=expected, remedy=remedy)
 
 
 def listed(names: Iterable[str]) -> str:
@@ -104,6 +96,12 @@ def listed(names: Iterable[str]) -> str:
     shown = [printable(name) for name in names]
     more = f" and {len(shown) - MANY} more" if len(shown) > MANY else ""
     return ", ".join(shown[:MANY]) + more
+
+
+def kinds(paths: Iterable[Path]) -> str:
+    """``3 .avi, 1 .vsk``: how many of each kind, the most first."""
+    counts = Counter(path.suffix.lower() or "without an ending" for path in paths)
+    return ", ".join(f"{n} {printable(kind)}" for kind, n in counts.most_common())
 
 
 @dataclass
@@ -114,7 +112,7 @@ class Folder:
     participant: str
     roles: Mapping[str, tuple[str, ...]]
     trials: list[Trial] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[BadDataError] = field(default_factory=list)
     refusals: list[BadDataError] = field(default_factory=list)
     others: list[Path] = field(default_factory=list)
     spare_forces: list[Path] = field(default_factory=list)
@@ -136,7 +134,7 @@ class Folder:
             elif session is None and path.name.startswith("ses-") and (no := _fault_of_file(path)):
                 self._session(path, no)
             elif kind in PACKED and _is_packed_recording(path, names):
-                self.faults.append(Fault(path, "is packed", "the file itself", "unpack it"))
+                self.faults.append(_fault(path, "is packed", "the file itself", "unpack it"))
             else:
                 self.others.append(path)
 
@@ -148,8 +146,9 @@ class Folder:
             except BadDataError as several:
                 self.refusals.append(several)
                 return
-            if forces and (fault := _fault_of_file(forces)):
-                fault = replace(fault, path=path, found=f"its forces, {forces.name}: {fault.found}")
+            if forces and (no := _fault_of_file(forces)):
+                found = f"its forces, {forces.name}: {no.found}"
+                fault = _fault(path, found, no.expected, no.remedy)
         if fault:
             self.faults.append(fault)
             return
@@ -157,21 +156,21 @@ class Folder:
         known = trial_named(self.participant, name, path, self.roles)
         self.trials.append(replace(known, stem=path.stem, session=session, forces=forces))
 
-    def _fault_of_name(self, path: Path, session: str | None) -> Fault | None:
+    def _fault_of_name(self, path: Path, session: str | None) -> BadDataError | None:
         """What is wrong with a recording's name in the folder of a session, or in none's."""
         here = _place(self.participant, session)
         expected = _names_like(here)
         match = _TRIAL.fullmatch(path.stem)
         if match is None:
-            return Fault(path, "its name does not say what it is", expected, "rename it")
+            return _fault(path, "its name does not say what it is", expected, "rename it")
         named = _place(match["participant"], match["session"])
         if named != here:
             found = f"its name says {named} and its folder {here}"
-            return Fault(path, found, expected, "rename it, or move it")
+            return _fault(path, found, expected, "rename it, or move it")
         if len(path.stem) > STEM_BYTES:
             found = f"a name of {len(path.stem)} letters before its ending"
             expected = f"at most {STEM_BYTES}, since the names of its results are longer"
-            return Fault(path, found, expected, "shorten it")
+            return _fault(path, found, expected, "shorten it")
         return None
 
     def _forces(self, path: Path, names: set[str]) -> None:
@@ -185,22 +184,20 @@ class Folder:
             self.spare_forces.append(path)
         elif _TRIAL.fullmatch(stem):
             expected = f"{stem}.trc, with its markers, next to it"
-            self.faults.append(
-                Fault(path, "forces without markers", expected, "add that file, or remove this one")
-            )
+            remedy = "add that file, or remove this one"
+            self.faults.append(_fault(path, "forces without markers", expected, remedy))
         else:
             self.others.append(path)
 
-    def _session(self, path: Path, no_file: Fault) -> None:
+    def _session(self, path: Path, no_file: BadDataError) -> None:
         if not is_folder(path):
-            self.faults.append(replace(no_file, expected="a session's folder"))
+            self.faults.append(_fault(path, no_file.found, "a session's folder", no_file.remedy))
             return
         match = _SESSION.fullmatch(path.name)
         if match is None:
             found, expected = "a session's folder of this name", "ses- and letters or digits"
-            self.faults.append(
-                Fault(path, found, expected, "rename the folder and the recordings in it")
-            )
+            remedy = "rename the folder and the recordings in it"
+            self.faults.append(_fault(path, found, expected, remedy))
             return
         try:
             self.look_through(path, match["session"])
@@ -215,31 +212,22 @@ def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, .
     """
     found = Folder(folder, participant, roles)
     found.look_through(folder)
-    found.refusals[:0] = refusals_of(found.faults)
+    found.refusals[:0] = merged(found.faults)
     found.trials.sort(key=lambda trial: trial.stem)
     names: dict[str, list[str]] = {}  # of files of results, also where capitals do not count
     for trial in found.trials:
         names.setdefault(trial.stem.casefold(), []).append(trial.path.name)
     if double := [name for alike in names.values() if len(alike) > 1 for name in alike]:
-        found.refusals.append(
-            BadDataError(
-                f"recordings of one name, but for capitals and the ending: {listed(double)}",
-                file=folder,
-                expected="one .c3d or one .trc of each name",
-                remedy="remove one or give it a run number",
-            )
-        )
+        what = f"recordings of one name, but for capitals and the ending: {listed(double)}"
+        expected, remedy = "one .c3d or one .trc of each name", "remove one or give it a run number"
+        found.refusals.append(_fault(folder, what, expected, remedy))
         found.trials.clear()
     if not found.trials:
-        are_unusable = bool(found.refusals)
-        found.refusals.append(
-            BadDataError(
-                "none of its recordings can be used" if are_unusable else "no recordings",
-                file=folder,
-                expected=f"recordings with {_names_like(participant)}",
-                remedy="correct what is said of each" if are_unusable else "add them",
-            )
-        )
+        what, remedy = "no recordings", "add them"
+        if found.refusals:
+            what, remedy = "none of its recordings can be used", "correct what is said of each"
+        expected = f"recordings with {_names_like(participant)}"
+        found.refusals.append(_fault(folder, what, expected, remedy))
     return found
 
 
@@ -251,15 +239,13 @@ def _place(participant: str, session: str | None) -> str:
     return f"{participant}_ses-{session}" if session else participant
 
 
-def _fault_of_file(path: Path) -> Fault | None:
+def _fault_of_file(path: Path) -> BadDataError | None:
     """Why a path is no file that can be read; nothing is opened."""
-    found, expected = fault_of(path), "a file that may be read"
-    if not found:
+    if not (found := fault_of(path)):
         return None
-    if ".git/annex/" in found:  # where a DataLad clone's links lead
-        remedy = "fetch its content with `datalad get` or `git annex get`"
-        return Fault(path, found, expected, remedy, alike="not fetched")
-    return Fault(path, found, expected, "put the file there, or remove what is in its place")
+    is_annexed = ".git/annex/" in found  # where a DataLad clone's links lead
+    remedy = _FETCH if is_annexed else "put the file there, or remove what is in its place"
+    return _fault(path, found, "a file that may be read", remedy)
 
 
 def _is_packed_recording(path: Path, names: set[str]) -> bool:

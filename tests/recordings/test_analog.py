@@ -6,10 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.signal import butter, filtfilt
 
 from bsip_cli.recordings import plate_reading as copies
 from bsip_cli.recordings.analog import SampleCheck, check_samples, sample_findings, spike_samples
+from bsip_cli.recordings.body_motion import SMOOTH_S
 from tests.circumstances.sound import sound_session
 
 RATE_HZ = 1000.0
@@ -70,20 +72,24 @@ def test_what_is_only_calm_is_not_clipped(calm):
     assert not clipped(calm).any()
 
 
-def repeated(**forces):
-    """Names of repeats; a force (n,), or that and its place (n,) along X."""
-    usable, trial = np.ones(len(TIME_S), bool), {}
+def repeated(seen=slice(None), **forces):
+    """Names of repeats; a force (n,), or that and its place (n,) along X; by some samples."""
+    usable, trial, smooth = np.ones(len(TIME_S), bool)[seen], {}, {}
     for name, force in forces.items():
         load, place_m = force if isinstance(force, tuple) else (force, 0.0)
         wrench = np.zeros((len(TIME_S), 6))
         wrench[:, 2], wrench[:, 4] = load, -load * place_m
-        trial[name] = SimpleNamespace(
-            usable=usable,
-            parts=lambda wrench=wrench: wrench,
-            matrix=lambda _: np.eye(6),
-            floor_m=lambda: 0.0,
+        averaged = gaussian_filter1d(wrench, SMOOTH_S * RATE_HZ, axis=0)
+        trial[name], smooth[name] = (
+            SimpleNamespace(
+                usable=usable,
+                parts=lambda values=values: values,
+                matrix=lambda _: np.eye(6),
+                floor_m=lambda: 0.0,
+            )
+            for values in (wrench[seen], averaged[seen])
         )
-    return copies.repeated_plates([trial])
+    return copies.repeated_plates([trial], [smooth])
 
 
 def test_a_sum_is_known_by_most_samples_and_two_feet_are_no_copy():
@@ -112,6 +118,19 @@ def test_what_bears_load_at_the_same_place_is_one_plate():
     assert repeated(a=left, b=right, c=(0.3 * total, middle_m)) == {}  # a foot between two others
     late = np.where(np.arange(len(other)) > len(other) // 2, other, 0.0)
     assert repeated(a=(other - late, sway_m), b=(late, sway_m)) == {}  # never loaded at once
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_a_sum_in_running_is_known_though_its_columns_are_low_passed(order):
+    """Forces and places, which are zero in flight, by 6 Hz each; feet come down 0.37 s apart."""
+    phase = np.array([TIME_S / 0.74, TIME_S / 0.74 + 0.5]) % 1.0 / 0.35  # 0.26 s on the ground
+    loads = 1700.0 * np.where(phase < 1.0, np.sin(np.pi * phase), 0.0)
+    places_m = np.where(phase < 1.0, 0.15 - 0.3 * phase, 0.0)
+    total, place_m = filtfilt(*butter(order, 6.0, fs=RATE_HZ), [loads.sum(0), places_m.sum(0)])
+    feet = {name: (loads[k], places_m[k]) for k, name in enumerate("ab")}
+    loaded = np.flatnonzero(loads.max(axis=0) > 850.0)
+    assert repeated(loaded, **feet, c=(total, place_m)) == {"c": ("a", "b")}
+    assert repeated(loaded, **feet) == {}
 
 
 def touching_down(rate_hz: float = 1000.0) -> np.ndarray:

@@ -274,12 +274,37 @@ def test_without_forces_or_at_two_frames_a_second_nothing_is_asked():
 @pytest.mark.parametrize("name", REAL)
 def test_real_recordings_have_no_delay_and_a_hidden_one_is_found(real_data, name):
     sound = open_recording(real_data / name)
-    assert session_of(sound).delays_s == {}
+    session = session_of(sound)
+    assert session.delays_s == {} and session.drifts_s == {}
     hidden = session_of(sound.with_forces_from(-0.37)).delays_s
     if REAL[name]:
         assert list(hidden.values()) == [pytest.approx(0.37, abs=0.04)]
     else:
         assert all(abs(found - 0.37) < 0.04 for found in hidden.values())
+
+
+@pytest.mark.parametrize("n", [8, 20])
+def test_rows_that_are_lost_where_the_rest_is_numbered_without_gaps_are_said(real_data, n):
+    sound = open_recording(real_data / "opencap_subject4/squats1.trc")
+    rows = np.arange(len(sound.sources[0].usable))
+    starts = np.linspace(0.1, 0.9, 5) * len(rows)
+    kept = np.setdiff1d(rows, [int(start) + k for start in starts for k in range(n)])
+    kept = np.pad(kept, (0, len(rows) - len(kept)), mode="edge")
+    torn = replace(sound, sources=tuple(one.at(kept) for one in sound.sources))
+    session = session_of(torn)
+    lost_s = 5 * n / sound.recording.analog_rate_hz
+    assert session.drifts_s["squats1"] == pytest.approx(-lost_s, abs=0.3 * lost_s + 0.05)
+    said = [f for f in assemble(torn, session).findings if "drift apart" in f.found]
+    assert [f.level for f in said] == ["warning"] and "further ahead" in said[0].found
+
+
+@pytest.mark.parametrize("times", [0.94, 1.05, 1.09])
+def test_a_clock_that_runs_faster_is_said(real_data, times):
+    sound = open_recording(real_data / "opencap_subject4/squats1.trc")
+    rows = np.arange(len(sound.sources[0].usable))
+    read = (rows / times).round().astype(int).clip(0, rows[-1])
+    drifts = session_of(replace(sound, sources=tuple(s.at(read) for s in sound.sources))).drifts_s
+    assert np.sign(drifts["squats1"]) == np.sign(times - 1.0)
 
 
 def test_a_small_delay_is_found_where_the_body_moves_fast(real_data):

@@ -18,7 +18,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import UsageError, did_you_mean, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
-from bsip_cli.running.runner import Manner, Outcome, run_stages
+from bsip_cli.running.runner import Outcome, run_stages
 from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
@@ -44,15 +44,14 @@ def run_session(
     verify: bool = False,
     estimators: tuple[str, ...] = (),
     group: bool = False,
-    verbose: bool = False,
-    quiet: bool = False,
     until: str | None = None,
+    **voice: bool,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
     ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
     about one participant; ``until`` is the last stage; ``verify`` hashes every file, also where
-    its times have not changed; ``verbose`` and ``quiet`` as `follow` takes them.
+    its times have not changed; ``voice`` as `follow` takes it.
     """
     stages = _stages(command, chosen, group, until)
     if any(stage.level == "cohort" for stage in stages):
@@ -62,8 +61,8 @@ def run_session(
     if not chosen:
         notes.append(_left_behind(out, opened.study))
     refusals = (*opened.refusals, *_notes(*notes))
-    manner = Manner(force=force, verify=verify, jobs=jobs)
-    running = run_stages(stages, opened.study, out, opened.config, manner)
+    whole = (stages, opened.study, out, opened.config)
+    running = run_stages(*whole, force=force, verify=verify, jobs=jobs)
     trials = {p.id: len(p.trials) for p in opened.study.participants}
     units = {"cohort": [1], "participant": trials.values(), "trial": [1] * sum(trials.values())}
     total = sum(cost_s(s.name, s.level, n) for s in stages for n in units[s.level])
@@ -73,7 +72,7 @@ def run_session(
         level = "trial" if "_task-" in outcome.unit else level
         return cost_s(outcome.stage, level, trials.get(outcome.unit, 1))
 
-    return follow(command, refusals, running, total, out, cost, verbose=verbose, quiet=quiet)
+    return follow(command, refusals, running, total, out, cost, **voice)
 
 
 def _stages(
@@ -192,7 +191,7 @@ class _Voice:
 
     def report(self, outcome: Outcome) -> None:
         if outcome.state == "waiting" and not outcome.exit_code:
-            stages = self.kept_from.setdefault(outcome.unit.split("_")[0], [])
+            stages = self.kept_from.setdefault(outcome.owner, [])
             stages += [outcome.stage] if outcome.stage not in stages else []
             return
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS

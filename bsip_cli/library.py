@@ -30,7 +30,7 @@ from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, config_of
 from bsip_cli.errors import BadDataError, BsipError, UsageError
-from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.pipeline import STAGES, Stage, producer, upstream
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_reading import Opened
 from bsip_cli.recordings.plates import PlateDescription
@@ -250,7 +250,8 @@ class Person:
 
         BsipError: The person cannot be done.
         """
-        for stage in _needed(last):
+        asked = (one for one in STAGES if one.name == last and one.level != "cohort")
+        for stage in upstream(asked, lambda one: (*one.reads, *one.amends)):
             if stage.label in self._done:
                 continue
             trials = self._participant.trials if stage.level == "trial" else (None,)
@@ -281,18 +282,6 @@ class Person:
     def _unit(self, stage: Stage, trial: Trial | None = None) -> Unit:
         whole = self._study, _NOWHERE, self.config, self._participant
         return _InMemory(stage, *whole, trial, recordings=self._recordings, kept=self._kept)
-
-
-def _needed(last: str) -> list[Stage]:
-    """A stage and all that it reads from, in order."""
-    needed: set[str] = set()
-    open_ = [stage for stage in STAGES if stage.name == last and stage.level != "cohort"]
-    while open_:
-        stage = open_.pop()
-        if stage.label not in needed:
-            needed.add(stage.label)
-            open_ += [producer(kind) for kind in (*stage.reads, *stage.amends)]
-    return [stage for stage in STAGES if stage.label in needed]
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,7 +194,6 @@ class Breathing(Effect, name="breathing"):
 class ChestMotion(Load):
     """Mass that leaves its place in a body: mass times displacement (T, 3), body axes."""
 
-    over_time = ("dipole_kgm",)
     body: str
     position_m: np.ndarray
     dipole_kgm: np.ndarray
@@ -253,7 +252,6 @@ class Support(Load):
     position_m : (3,) in the body's frame. force_n : (T, 3) on the body.
     """
 
-    over_time = ("force_n",)
     body: str
     position_m: np.ndarray
     force_n: np.ndarray

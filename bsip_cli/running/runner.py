@@ -177,9 +177,9 @@ def _is_unchanged(task: _Task) -> bool:
     now = _state(task)
     if task.verify:
         return False
-    folders = [task.out / participant.id for participant in task.study.participants]
-    notes = [fingerprints.recall(folder) for folder in [task.folder, *folders]]
-    return notes[0] == now != "" and not task.force
+    for participant in task.study.participants:
+        fingerprints.recall(task.out / participant.id)
+    return fingerprints.recall(task.folder) == now != "" and not task.force
 
 
 def _state(task: _Task) -> str:

@@ -150,9 +150,7 @@ def follow(
     out: Path | None,
     cost: Callable[[Outcome], float] = lambda outcome: 1.0,
     /,
-    *,
-    verbose: bool = False,
-    quiet: bool = False,
+    **how: bool,
 ) -> int:
     """Report to the user what becomes of the units, with a bar of ``total`` steps; the exit code.
 
@@ -161,10 +159,10 @@ def follow(
     kept. ``verbose``: of each unit what it read and how long it took. ``quiet``: findings and
     errors only.
     """
-    outcomes, voice = list(refusals), _Voice(verbose, quiet)
+    outcomes, voice = list(refusals), _Voice(**how)
     for outcome in outcomes:
         voice.report(outcome)
-    off = True if quiet else None  # None: where nobody watches
+    off = True if voice.quiet else None  # None: where nobody watches
     bar = tqdm(total=total, desc=command, bar_format=_BAR, smoothing=0, disable=off)
     with bar as progress, closing(running):  # whatever happens here, no process goes on
         for outcome in running:
@@ -174,7 +172,7 @@ def follow(
             progress.update(0 if is_idle or outcome.state == "noted" else steps)
             voice.report(outcome)
     voice.report_the_others()
-    if not quiet:
+    if not voice.quiet:
         _summary(command, outcomes, out)
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
 
@@ -184,10 +182,10 @@ class _Voice:
     """What the user hears; a remark that many recordings get is made once, and at the end it is
     said of which others it is true, and from which stages a refusal kept whom."""
 
-    verbose: bool
-    quiet: bool
-    said: dict[tuple[str, str], dict[str, list[str]]] = field(default_factory=dict)
-    kept_from: dict[str, list[str]] = field(default_factory=dict)  # by person
+    verbose: bool = False
+    quiet: bool = False
+    said: dict[tuple[str, str], dict[str, list[str]]] = field(init=False, default_factory=dict)
+    kept_from: dict[str, list[str]] = field(init=False, default_factory=dict)  # by person
 
     def report(self, outcome: Outcome) -> None:
         if outcome.state == "waiting" and not outcome.exit_code:

@@ -354,14 +354,12 @@ def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dic
 
 def _changed_by(effects: Sequence[Effect], instruments: Instruments, file: Path) -> Instruments:
     """Instruments with all effects, each of which must have changed something."""
+    lacking = {} if instruments.plates else {"plates": "force plates, and there are none"}
+    if not instruments.surfaces_known:
+        lacking["surface"] = "to know where the plates lie, and a MOT file does not say"
     for effect in effects:
-        if "plates" in effect.needs and not instruments.plates:
-            raise BadDataError(f"{effect.name} needs force plates, and there are none", file=file)
-        if "surface" in effect.needs and not instruments.surfaces_known:
-            raise BadDataError(
-                f"{effect.name} needs to know where the plates lie, and a MOT file does not say",
-                file=file,
-            )
+        if why := next((lacking[need] for need in effect.needs if need in lacking), ""):
+            raise BadDataError(f"{effect.name} needs {why}", file=file)
         try:
             changed = effect.injected(instruments)
         except (UsageError, BadDataError) as error:  # what is asked for may be in the other files

@@ -22,7 +22,7 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.simulate.movements import DEFAULT_DURATION_S
+from bsip_cli.simulate.movements import MOVEMENTS
 from bsip_cli.simulate.options import PRESETS, StudyOptions
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import GRAVITY
@@ -88,7 +88,7 @@ def _of_trial(out: Path, options: StudyOptions, name: str, task: str) -> list[di
         person,
         task,
         generator(options, number, MOVEMENT, task),
-        options.durations_s.get(task, DEFAULT_DURATION_S[task]),
+        options.durations_s.get(task, MOVEMENTS[task][1]),
         0.3,
         wobbling(person),
     )

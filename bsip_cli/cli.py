@@ -277,7 +277,12 @@ def main() -> None:
     except EndedError as ended:
         ignore_endings()
         sentence, exit_code = str(ended), ended.exit_code
-    _end(sentence, exit_code)
+    with suppress(OSError):  # somebody may listen no more
+        if sentence:
+            click.echo(f"bsip: {sentence}", err=True)
+    with suppress(OSError):  # what stands in its buffer cannot be written either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    leave(exit_code)
 
 
 def _answer() -> tuple[str, int]:
@@ -299,13 +304,3 @@ def _answer() -> tuple[str, int]:
     except OSError as error:
         return str(not_readable(error)), 2
     return "", exit_code or 0
-
-
-def _end(sentence: str, exit_code: int) -> None:
-    """Say the last sentence, if somebody listens still, and leave."""
-    with suppress(OSError):
-        if sentence:
-            click.echo(f"bsip: {sentence}", err=True)
-    with suppress(OSError):  # what stands in its buffer cannot be written either
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    leave(exit_code)

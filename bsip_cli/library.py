@@ -30,7 +30,7 @@ from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, config_of
 from bsip_cli.errors import BadDataError, BsipError, UsageError
-from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.pipeline import STAGES, Stage, producer, upstream
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_reading import Opened
 from bsip_cli.recordings.plates import PlateDescription
@@ -167,12 +167,10 @@ class Person:
         self._done: set[str] = set()
         self._kept: dict[Path, _Kept] = {}
         roles = self.config.roles.model_dump()
-        named = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
-        self._recordings = {named[name].stem: opened for name, opened in trials.items()}
-        self._names = {trial.stem: name for name, trial in named.items()}
-        self._participant = Participant(
-            _ID, cast(Any, sex), mass_kg, height_m, tuple(named.values())
-        )
+        self._trials = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
+        self._recordings = {self._trials[name].stem: opened for name, opened in trials.items()}
+        its_own = tuple(self._trials.values())
+        self._participant = Participant(_ID, cast(Any, sex), mass_kg, height_m, its_own)
         self._study = Study(_NOWHERE, (self._participant,))
 
     # --- the stages ---------------------------------------------------------------------------
@@ -229,9 +227,7 @@ class Person:
 
         KeyError: It has not been made.
         """
-        stems = {name: stem for stem, name in self._names.items()}
-        stem = stems[trial] if trial else ""
-        own = next((one for one in self._participant.trials if one.stem == stem), None)
+        own = self._trials[trial] if trial else None
         return self._kept[self._unit(producer(kind)).path(kind, own)].frame.copy()
 
     # --- running them -------------------------------------------------------------------------
@@ -243,24 +239,27 @@ class Person:
     def _by_trial(self, stage: str, kind: str) -> dict[str, pd.DataFrame]:
         self._run(stage)
         made = self._unit(producer(kind)).trials(kind)
-        return {self._names[one.stem]: self.table(kind, self._names[one.stem]) for one in made}
+        names = (name for name, trial in self._trials.items() if trial in made)
+        return {name: self.table(kind, name) for name in names}
 
     def _run(self, last: str) -> None:
         """What a stage needs, and itself, once; a trial that is refused does not stop the others.
 
         BsipError: The person cannot be done.
         """
-        for stage in _needed(last):
+        asked = (one for one in STAGES if one.name == last and one.level != "cohort")
+        for stage in upstream(asked, lambda one: (*one.reads, *one.amends)):
             if stage.label in self._done:
                 continue
-            trials = self._participant.trials if stage.level == "trial" else (None,)
-            for trial in trials:
-                self._do(self._unit(stage, trial))
+            of_trials = stage.level == "trial"
+            trials: Mapping[str, Trial | None] = self._trials if of_trials else {"": None}
+            for name, trial in trials.items():
+                self._do(self._unit(stage, trial), name)
             self._done.add(stage.label)
 
-    def _do(self, unit: Unit) -> None:
+    def _do(self, unit: Unit, trial: str) -> None:
         if gone := unit.missing():
-            if unit.trial is None:
+            if not trial:
                 raise next(iter(self.refused.values()), None) or BadDataError(
                     f"{unit.stage.name} has no {', '.join(gone)} to read",
                     file=unit.name,
@@ -270,10 +269,8 @@ class Person:
         try:
             unit.stage.run(unit)
         except BsipError as error:
-            self.refused[unit.stage.name, self._names[unit.trial.stem] if unit.trial else ""] = (
-                error
-            )
-            if unit.trial is None:
+            self.refused[unit.stage.name, trial] = error
+            if not trial:
                 raise
         finally:
             self.messages += unit.messages
@@ -281,18 +278,6 @@ class Person:
     def _unit(self, stage: Stage, trial: Trial | None = None) -> Unit:
         whole = self._study, _NOWHERE, self.config, self._participant
         return _InMemory(stage, *whole, trial, recordings=self._recordings, kept=self._kept)
-
-
-def _needed(last: str) -> list[Stage]:
-    """A stage and all that it reads from, in order."""
-    needed: set[str] = set()
-    open_ = [stage for stage in STAGES if stage.name == last and stage.level != "cohort"]
-    while open_:
-        stage = open_.pop()
-        if stage.label not in needed:
-            needed.add(stage.label)
-            open_ += [producer(kind) for kind in (*stage.reads, *stage.amends)]
-    return [stage for stage in STAGES if stage.label in needed]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import groupby
@@ -117,3 +117,17 @@ def in_turn(stages: Iterable[Stage]) -> Iterator[tuple[Stage, ...]]:
 def producer(kind: str) -> Stage:
     """The stage that writes a kind of artifact."""
     return next(stage for stage in STAGES if kind in stage.writes)
+
+
+def upstream(
+    stages: Iterable[Stage], kinds_of: Callable[[Stage], Iterable[str]]
+) -> tuple[Stage, ...]:
+    """Stages and all that make what they build on, which is kinds of artifacts, in order."""
+    found: set[str] = set()
+    waiting = [*stages]
+    while waiting:
+        stage = waiting.pop()
+        if stage.label not in found:
+            found.add(stage.label)
+            waiting += map(producer, kinds_of(stage))
+    return tuple(stage for stage in STAGES if stage.label in found)

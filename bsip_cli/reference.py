@@ -77,11 +77,7 @@ def _runs(names: Sequence[str], order: Sequence[str]) -> str:
 def cli_page() -> str:
     """Every command with its own options; those of several are explained once."""
     lines = {
-        name: [
-            f"- `{_spelling(one)}`: {one.help or ''}{_default(one)}"
-            for one in command.params
-            if isinstance(one, click.Option)
-        ]
+        name: [_explained(one) for one in command.params if isinstance(one, click.Option)]
         for name, command in cli.commands.items()
     }
     seen = Counter(line for each in lines.values() for line in each)
@@ -113,22 +109,19 @@ def _paragraphs(command: click.Command) -> str:
     return "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
 
 
-def _spelling(option: click.Option) -> str:
-    names, kind = ", ".join(option.opts), option.type
-    if option.is_flag:
-        return names
+def _explained(option: click.Option) -> str:
+    """How it is spelt, what it means, and what is so without it."""
+    kind, taken = option.type, ""
     if isinstance(kind, click.Choice):
-        return f"{names} {{{','.join(kind.choices)}}}"
-    if isinstance(kind, click.IntRange | click.FloatRange):
+        taken = f" {{{','.join(kind.choices)}}}"
+    elif isinstance(kind, click.IntRange | click.FloatRange):
         low, high = ("" if bound is None else f"{bound:g}" for bound in (kind.min, kind.max))
-        return f"{names} {low}..{high}"
-    return f"{names} {option.metavar or kind.name.upper()}"
-
-
-def _default(option: click.Option) -> str:
-    if option.required:
-        return " Required."
-    return f" Without it `{option.default}`." if option.show_default else ""
+        taken = f" {low}..{high}"
+    elif not option.is_flag:
+        taken = f" {option.metavar or kind.name.upper()}"
+    default = f" Without it `{option.default}`." if option.show_default else ""
+    without = " Required." if option.required else default
+    return f"- `{', '.join(option.opts)}{taken}`: {option.help or ''}{without}"
 
 
 # --- faults -----------------------------------------------------------------------------------

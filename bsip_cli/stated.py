@@ -90,6 +90,7 @@ _BELOW = {"ft": ("in", 12), "st": ("lb", 14), "m": ("cm", 100)}
 _QUOTES = str.maketrans("‘’′´`“”″", "'''''\"\"\"")
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
 _WITH_POINT = re.compile(r"\s*(\d+)[.,](\d{1,2})(?!\d)")
+_DECIMAL = re.compile(r"\s*\d+[.,]\d*[1-9]")
 _PART = re.compile(rf"\s*({_NUMBER})\s*((?:[^\W\d_]+|''|['\"])?)\.?", re.IGNORECASE)
 
 
@@ -122,7 +123,8 @@ def readings_of(
     else:
         return ()
     if found := _within(quantity, first, True):
-        is_one = len(parts) > 1 or any(_is_decimal(one, stated, quantity) for one in column)
+        decimals = filter(_DECIMAL.match, column)
+        is_one = len(parts) > 1 or any(not _as_two(one, stated, quantity) for one in decimals)
         return found + _within(quantity, [] if is_one else _as_two(text, stated, quantity), False)
     if is_spelt:
         return ()
@@ -150,12 +152,6 @@ def _as_two(text: str, unit: str, quantity: Quantity) -> list[tuple[float, str]]
         for n in sorted(map(int, numbers))
         if 0 < n < many
     ]
-
-
-def _is_decimal(text: str, unit: str, quantity: Quantity) -> bool:
-    """Whether what stands behind the point can be no number of the unit below."""
-    behind = re.match(r"\s*\d+[.,]\d*[1-9]", text)
-    return behind is not None and not _as_two(text, unit, quantity)
 
 
 def _parts(text: str) -> list[tuple[float, str]]:
@@ -270,16 +266,15 @@ _OTHER_LETTERS = "o u"  # unless they begin a word of the column's language
 _Pair = dict[str, Sex]
 
 
-def _plain(text: str) -> str:
-    """Without accents, where that leaves a word."""
-    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
-    return bare if len(bare) > 2 else text
-
-
 def _pair(words: str) -> _Pair:
+    """What each word means, also without accents, where that leaves a word."""
     sexes: tuple[Sex, ...] = ("F", "M", OTHER)
-    both = dict(zip(words.split(), sexes, strict=False))
-    return both | {_plain(word): sex for word, sex in both.items()}
+    pair = dict(zip(words.split(), sexes, strict=False))
+    for word, sex in [*pair.items()]:
+        letters = unicodedata.normalize("NFKD", word)
+        bare = "".join(c for c in letters if not unicodedata.combining(c))
+        pair |= {bare: sex} if len(bare) > 2 else {}
+    return pair
 
 
 _PAIRS = [(k, _pair(words)) for k, (_, line) in enumerate(_LANGUAGES) for words in line.split(",")]

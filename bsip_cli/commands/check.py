@@ -12,7 +12,7 @@ import numpy as np
 from bsip_cli.errors import printable
 from bsip_cli.pipeline import producer, stages_named
 from bsip_cli.report.words import count
-from bsip_cli.running.runner import Manner, run_stages
+from bsip_cli.running.runner import run_stages
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Participant, Trial
@@ -30,7 +30,7 @@ def check_study(
     with TemporaryDirectory(prefix="bsip-check-") as folder:
         out = Path(folder) / "results"
         opened = open_study(study, out, chosen, config_file)
-        running = run_stages(stages, opened.study, out, opened.config, Manner(jobs=jobs))
+        running = run_stages(stages, opened.study, out, opened.config, jobs=jobs)
         total = sum(2 + len(person.trials) for person in opened.study.participants)
         code = follow("check", opened.refusals, running, total, None, **voice)
         for person in opened.study.participants:

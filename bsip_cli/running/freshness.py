@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash, fingerprint
-from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.pipeline import STAGES, Stage, upstream
 from bsip_cli.running.unit import Unit, code_hash
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study
@@ -55,13 +54,12 @@ def was_changed(unit: Unit) -> list[str]:
 def stale_upstream(unit: Unit, participant: Participant | None, stages: Collection[Stage]) -> str:
     """The first result of a participant, or of the group, on which ``stages`` build and that is no
     more true, and why; empty if all are."""
-    of_group = participant is None
-    earlier = (one for stage in stages for one in _before(stage))
-    before = {one.label for one in earlier if (one.level == "cohort") == of_group}
-    before -= {stage.label for stage in stages}
-    for stage in STAGES:
-        whole = unit.study, unit.out, unit.config_of_all, participant, unit.left_out
-        for other in units_of(stage, *whole) if stage.label in before else ():
+    own, of_group = {stage.label for stage in stages}, participant is None
+    whole = unit.study, unit.out, unit.config_of_all, participant, unit.left_out
+    for stage in upstream(stages, lambda one: one.inputs):
+        if stage.label in own or (stage.level == "cohort") != of_group:
+            continue
+        for other in units_of(stage, *whole):
             refusal, kinds = other.refusal_path(), other.stage.writes
             if refusal.exists():  # what was refused as it stands, or is not there, is no lie
                 made_by = read_header(refusal, "refusal")["provenance"]["made_by"]
@@ -86,18 +84,6 @@ def units_of(
     trials = participant.trials if participant and stage.level == "trial" else (None,)
     for trial in trials:
         yield Unit(stage, study, out, config, participant, trial, left_out=left_out)
-
-
-@lru_cache(maxsize=64)
-def _before(stage: Stage) -> tuple[Stage, ...]:
-    found: set[str] = set()
-    waiting = list(stage.inputs)
-    while waiting:
-        maker = producer(waiting.pop())
-        if maker.label not in found:
-            found.add(maker.label)
-            waiting += maker.inputs
-    return tuple(s for s in STAGES if s.label in found)
 
 
 # --- one artifact -----------------------------------------------------------------------------

@@ -46,20 +46,17 @@ def raise_when_ended(once: bool = False) -> None:
 
     once : those that come later are ignored, for a process that another one will kill.
     """
+
+    def answer(number: int, _frame: object) -> None:
+        if once:
+            ignore_endings()
+        _raised.append(number)
+        raise EndedError(number)
+
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _raise_once if once else _raise)
+            signal.signal(number, answer)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-
-
-def _raise(number: int, _frame: object) -> None:
-    _raised.append(number)
-    raise EndedError(number)
-
-
-def _raise_once(number: int, frame: object) -> None:
-    ignore_endings()
-    _raise(number, frame)
 
 
 def end_if_asked() -> None:

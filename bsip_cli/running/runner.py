@@ -9,7 +9,7 @@ import time
 import traceback
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -46,32 +46,26 @@ class Outcome:
     seconds: float = 0.0
     reads: tuple[str, ...] = ()
 
-
-@dataclass(frozen=True)
-class Manner:
-    """How stages are run: ``force`` redoes what is fresh, ``verify`` hashes every file again,
-    ``jobs`` participants run at once, each in a process of its own."""
-
-    force: bool = False
-    verify: bool = False
-    jobs: int = 1
-
-
-_Part = Literal["first", "last", "some"]  # of all stages about one participant
+    @property
+    def owner(self) -> str:
+        """The participant whom the unit is about, or ``group``."""
+        return self.unit.split("_")[0]
 
 
 @dataclass(frozen=True)
 class _Task:
-    """Stages of one participant, or of the cohort; ``doubtful``: whose results may be stale."""
+    """Stages of one participant, or of the cohort; ``doubtful``: whose results may be stale;
+    ``part``: the first or last of all stages about one participant, or some of them."""
 
     stages: tuple[Stage, ...]
     study: Study
     out: Path
     config: Config
-    manner: Manner
+    force: bool
+    verify: bool
     participant: Participant | None = None
     doubtful: frozenset[str] = frozenset()
-    part: _Part = "some"
+    part: str = "some"
 
     @property
     def name(self) -> str:
@@ -88,32 +82,41 @@ class _Task:
 
 
 def run_stages(
-    stages: tuple[Stage, ...], study: Study, out: Path, config: Config, manner: Manner
+    stages: tuple[Stage, ...],
+    study: Study,
+    out: Path,
+    config: Config,
+    jobs: int,
+    force: bool = False,
+    verify: bool = False,
 ) -> Generator[Outcome, None, None]:
     """Run ``stages`` participant by participant and those of the cohort in turn; yield what became.
+
+    ``force`` redoes what is fresh, ``verify`` hashes every file again, ``jobs`` participants run at
+    once, each in a process of its own.
 
     EndedError: a signal asked this process or one of its workers to end.
     """
     personal, _ = by_level(stages)
     whole = all(stage in personal for stage in by_level(STAGES)[0])
+    how = (out, config, force, verify)
     troubled: set[str] = set()
     for mine in in_turn(stages):
         if mine[0].level == "cohort":
             doubtful = troubled if whole else {one.id for one in study.participants}
-            group = _Task(mine, study, out, config, manner, doubtful=frozenset(doubtful))
-            yield from (outcome for _, outcome in _outcomes([group], 1))
+            yield from _outcomes([_Task(mine, study, *how, doubtful=frozenset(doubtful))], 1)
             continue
-        part: _Part = ("last" if personal[-1] in mine else "first") if whole else "some"
+        part = ("last" if personal[-1] in mine else "first") if whole else "some"
         alone = (  # all that a process needs to know
-            _Task(mine, Study(study.root, (one,)), out, config, manner, one, part=part)
+            _Task(mine, Study(study.root, (one,)), *how, one, part=part)
             for one in study.participants
         )
-        for owner, outcome in _outcomes(alone, manner.jobs):
-            troubled |= {owner} if outcome.exit_code else set()
+        for outcome in _outcomes(alone, jobs):
+            troubled |= {outcome.owner} if outcome.exit_code else set()
             yield outcome
 
 
-def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]]:
+def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[Outcome]:
     for result in work_on(tasks, _run, jobs, _tidy):
         if isinstance(result, Died):
             task, code = result.task, result.exit_code or 0
@@ -121,7 +124,7 @@ def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]
             ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
             killed = code == -signal.SIGKILL
             how = _SHORT_OF_MEMORY if killed else f"the process crashed ({ending})"
-            yield task.name, Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
+            yield Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
         else:
             yield result
 
@@ -132,45 +135,51 @@ def _tidy(task: _Task) -> None:
         pass  # what cannot be taken away now, the next run takes
 
 
-def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
+def _run(task: _Task) -> Iterator[Outcome]:
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):
                 for unit in task.units(task.study, {}):
-                    yield task.name, Outcome(unit.stage.name, unit.name, "fresh")
+                    yield Outcome(unit.stage.name, unit.name, "fresh")
                 return
             is_true = True
             for outcome in _run_alone(task):
                 is_true &= outcome.state in ("done", "fresh")
-                yield task.name, outcome
+                yield outcome
             time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
             state = _state(task) if is_true and task.part == "last" else ""
             recordings = [task.study.root / task.participant.id] if task.participant else []
             kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
             if fingerprints.kept_in(task.folder) != kept:
                 write_bytes(task.folder / fingerprints.NAME, kept)
-    except errors.BsipError as error:
-        yield task.name, _stopped(task, error)
-    except OSError as error:
-        yield task.name, _stopped(task, errors.not_readable(error))
     except Exception as error:  # noqa: BLE001  a bug outside of the units stops one task only
-        yield task.name, _bug(task.stages[0].name, task.name, error)
+        yield _failed(task.stages[0].name, task.name, error)
 
 
-def _stopped(task: _Task, error: errors.BsipError) -> Outcome:
-    sentence = str(error) if task.name in str(error) else f"{task.name}: {error}"
-    return Outcome(task.stages[0].name, task.name, "refused", (sentence,), error.exit_code)
+def _failed(stage: str, name: str, error: Exception) -> Outcome:
+    """What to say of what stops a unit or a task; of a bug with its trace, for the report of it."""
+    end_if_asked()
+    if isinstance(error, OSError):
+        error = errors.not_readable(error)
+    if isinstance(error, errors.BsipError):
+        sentence = str(error) if name in str(error) else f"{name}: {error}"
+        return Outcome(stage, name, "refused", (sentence,), error.exit_code)
+    if isinstance(error, MemoryError):
+        return Outcome(stage, name, "bug", (f"{name}: {_SHORT_OF_MEMORY}",), 1)
+    trace = "".join(traceback.format_exception(error)).strip()
+    found = f"a bug in bsip: {type(error).__name__}: {errors.printable(str(error))}"
+    return Outcome(stage, name, "bug", (f"{name}: {found}\n{trace}",), 1)
 
 
 def _is_unchanged(task: _Task) -> bool:
     """Nothing has changed since all of a participant's results were found to be up to date."""
     fingerprints.forget_all()
     now = _state(task)
-    if task.manner.verify:
+    if task.verify:
         return False
-    folders = [task.out / participant.id for participant in task.study.participants]
-    notes = [fingerprints.recall(folder) for folder in [task.folder, *folders]]
-    return notes[0] == now != "" and not task.manner.force
+    for participant in task.study.participants:
+        fingerprints.recall(task.out / participant.id)
+    return fingerprints.recall(task.folder) == now != "" and not task.force
 
 
 def _state(task: _Task) -> str:
@@ -213,7 +222,7 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
         said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
         yield Outcome(task.stages[0].name, task.name, "noted", said)
     for unit in units:
-        outcome = perform(unit, task.manner.force)
+        outcome = perform(unit, task.force)
         yield outcome
         if outcome.state == "unwritten":
             return
@@ -232,8 +241,7 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
     end_if_asked()
     stage, start = unit.stage, time.perf_counter()
     try:
-        waiting = lacking(unit)
-        if waiting is not None:
+        if (waiting := lacking(unit)) is not None:
             return waiting
         why = why_stale(unit)  # asked first: a file that changes from here on makes it stale
         if not why and not force:
@@ -241,31 +249,34 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         said = [f"{changed}: made again" for changed in was_changed(unit)]
         stage.run(unit)
         remove(unit.refusal_path())
-    except errors.BsipError as error:
-        return _refused(unit, error)
-    except OSError as error:
-        return _refused(unit, errors.not_readable(error))
     except Exception as error:  # noqa: BLE001  a bug in one unit leaves the others standing
-        bug = _bug(stage.name, unit.name, error)
-        _write_refusal(unit, "bug", bug.sentences[0].splitlines()[0])
-        return bug
+        return _written_down(unit, error)
     seconds, reads = time.perf_counter() - start, tuple(unit.kinds_read())
     return Outcome(stage.name, unit.name, "done", (*said, *unit.messages), 0, seconds, reads)
 
 
-def _refused(unit: Unit, error: errors.BsipError) -> Outcome:
-    """Write down what is wrong with the data; say what is wrong, after the unit's warnings."""
-    end_if_asked()
+def _written_down(unit: Unit, error: Exception) -> Outcome:
+    """What stopped a unit, written into its folder, too, unless the data have no part in it; said
+    after the unit's warnings."""
+    if isinstance(error, OSError):
+        error = errors.not_readable(error)
+    outcome = _failed(unit.stage.name, unit.name, error)
     if not isinstance(error, errors.UsageError):
+        kind, sentence = "bad data", str(error)
+        if isinstance(error, errors.NumericalError):
+            kind = "numerical failure"
+        elif outcome.state == "bug":
+            kind, sentence = "bug", outcome.sentences[0].splitlines()[0]
+        row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": sentence}])
+        notes = {"made_by": unit.made_by, "messages": list(unit.messages), "facts": {}}
         try:
-            kind = "numerical failure" if isinstance(error, errors.NumericalError) else "bad data"
-            _write_refusal(unit, kind, str(error))
+            write_artifact(unit.refusal_path(), "refusal", row, notes)
         except errors.NotWritableError as closed:
-            return _refused(unit, closed)
-    sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
-    said = (*unit.messages, sentence)
+            return _written_down(unit, closed)
+    if outcome.state == "bug":
+        return outcome
     state: State = "unwritten" if isinstance(error, errors.NotWritableError) else "refused"
-    return Outcome(unit.stage.name, unit.name, state, said, error.exit_code)
+    return replace(outcome, state=state, sentences=(*unit.messages, *outcome.sentences))
 
 
 def lacking(unit: Unit, refused_code: int = 0) -> Outcome | None:
@@ -283,22 +294,6 @@ def lacking(unit: Unit, refused_code: int = 0) -> Outcome | None:
         first, code = producer(gone[0]).name, 2
         why = f"{stage} has no {', '.join(gone)} to read; run `bsip {first}` first"
     return Outcome(stage, unit.name, "waiting", (f"{unit.name}: {why}",), code)
-
-
-def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
-    row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": sentence}])
-    notes = {"made_by": unit.made_by, "messages": list(unit.messages), "facts": {}}
-    write_artifact(unit.refusal_path(), "refusal", row, notes)
-
-
-def _bug(stage: str, name: str, error: Exception) -> Outcome:
-    """What to say of an exception that nobody foresaw, with its trace for the report of a bug."""
-    end_if_asked()
-    if isinstance(error, MemoryError):
-        return Outcome(stage, name, "bug", (f"{name}: {_SHORT_OF_MEMORY}",), 1)
-    trace = "".join(traceback.format_exception(error)).strip()
-    found = f"a bug in bsip: {type(error).__name__}: {errors.printable(str(error))}"
-    return Outcome(stage, name, "bug", (f"{name}: {found}\n{trace}",), 1)
 
 
 # --- only one program at a time writes into a folder of results -------------------------------

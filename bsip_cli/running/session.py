@@ -18,7 +18,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import UsageError, did_you_mean, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
-from bsip_cli.running.runner import Manner, Outcome, run_stages
+from bsip_cli.running.runner import Outcome, run_stages
 from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
@@ -44,15 +44,14 @@ def run_session(
     verify: bool = False,
     estimators: tuple[str, ...] = (),
     group: bool = False,
-    verbose: bool = False,
-    quiet: bool = False,
     until: str | None = None,
+    **voice: bool,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
     ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
     about one participant; ``until`` is the last stage; ``verify`` hashes every file, also where
-    its times have not changed; ``verbose`` and ``quiet`` as `follow` takes them.
+    its times have not changed; ``voice`` as `follow` takes it.
     """
     stages = _stages(command, chosen, group, until)
     if any(stage.level == "cohort" for stage in stages):
@@ -62,8 +61,8 @@ def run_session(
     if not chosen:
         notes.append(_left_behind(out, opened.study))
     refusals = (*opened.refusals, *_notes(*notes))
-    manner = Manner(force=force, verify=verify, jobs=jobs)
-    running = run_stages(stages, opened.study, out, opened.config, manner)
+    whole = (stages, opened.study, out, opened.config)
+    running = run_stages(*whole, force=force, verify=verify, jobs=jobs)
     trials = {p.id: len(p.trials) for p in opened.study.participants}
     units = {"cohort": [1], "participant": trials.values(), "trial": [1] * sum(trials.values())}
     total = sum(cost_s(s.name, s.level, n) for s in stages for n in units[s.level])
@@ -73,7 +72,7 @@ def run_session(
         level = "trial" if "_task-" in outcome.unit else level
         return cost_s(outcome.stage, level, trials.get(outcome.unit, 1))
 
-    return follow(command, refusals, running, total, out, cost, verbose=verbose, quiet=quiet)
+    return follow(command, refusals, running, total, out, cost, **voice)
 
 
 def _stages(
@@ -151,9 +150,7 @@ def follow(
     out: Path | None,
     cost: Callable[[Outcome], float] = lambda outcome: 1.0,
     /,
-    *,
-    verbose: bool = False,
-    quiet: bool = False,
+    **how: bool,
 ) -> int:
     """Report to the user what becomes of the units, with a bar of ``total`` steps; the exit code.
 
@@ -162,10 +159,10 @@ def follow(
     kept. ``verbose``: of each unit what it read and how long it took. ``quiet``: findings and
     errors only.
     """
-    outcomes, voice = list(refusals), _Voice(verbose, quiet)
+    outcomes, voice = list(refusals), _Voice(**how)
     for outcome in outcomes:
         voice.report(outcome)
-    off = True if quiet else None  # None: where nobody watches
+    off = True if voice.quiet else None  # None: where nobody watches
     bar = tqdm(total=total, desc=command, bar_format=_BAR, smoothing=0, disable=off)
     with bar as progress, closing(running):  # whatever happens here, no process goes on
         for outcome in running:
@@ -175,7 +172,7 @@ def follow(
             progress.update(0 if is_idle or outcome.state == "noted" else steps)
             voice.report(outcome)
     voice.report_the_others()
-    if not quiet:
+    if not voice.quiet:
         _summary(command, outcomes, out)
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
 
@@ -185,14 +182,14 @@ class _Voice:
     """What the user hears; a remark that many recordings get is made once, and at the end it is
     said of which others it is true, and from which stages a refusal kept whom."""
 
-    verbose: bool
-    quiet: bool
-    said: dict[tuple[str, str], dict[str, list[str]]] = field(default_factory=dict)
-    kept_from: dict[str, list[str]] = field(default_factory=dict)  # by person
+    verbose: bool = False
+    quiet: bool = False
+    said: dict[tuple[str, str], dict[str, list[str]]] = field(init=False, default_factory=dict)
+    kept_from: dict[str, list[str]] = field(init=False, default_factory=dict)  # by person
 
     def report(self, outcome: Outcome) -> None:
         if outcome.state == "waiting" and not outcome.exit_code:
-            stages = self.kept_from.setdefault(outcome.unit.split("_")[0], [])
+            stages = self.kept_from.setdefault(outcome.owner, [])
             stages += [outcome.stage] if outcome.stage not in stages else []
             return
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS

@@ -389,10 +389,9 @@ def _data_of(modules: frozenset[str]) -> set[Path]:
     named = {name for module in modules for name in _SHIPPED.findall(_source(module) or "")}
     folders = {_place_of(module.rpartition(".")[0]) for module in modules if "." in module}
     folders -= {_PACKAGE}
-    own = set()
-    for file in (file for folder in folders for file in _below(folder)):
-        if next(p for p in file.parents if (p / "__init__.py").is_file()) in folders:
-            own.add(file)
+    inside = (file for folder in folders for file in _below(folder))
+    package_of = {f: next(p for p in f.parents if (p / "__init__.py").is_file()) for f in inside}
+    own = {file for file, package in package_of.items() if package in folders}
     return own.union(*(_below(shipped(name)) for name in named - {_OPTIONS}))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 
@@ -54,20 +54,11 @@ class Poses:
 
 @dataclass(frozen=True, eq=False)
 class Load(ABC):
-    """Something that the body has to move, to hold, or may lean on.
-
-    over_time : names of the fields that are arrays over time.
-    """
-
-    over_time: ClassVar[tuple[str, ...]] = ()
+    """Something that the body has to move, to hold, or may lean on."""
 
     @abstractmethod
     def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Force (T, 3) that the body exerts on it, and that force's moment (T, 3)."""
-
-    def thinned(self, samples: slice) -> Self:
-        """The same load at some of the samples."""
-        return replace(self, **{name: getattr(self, name)[samples] for name in self.over_time})
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +70,6 @@ class Ball(Load):
     release_s : when half the load has left the hand, on the recording's clock.
     """
 
-    over_time = ("hold",)
     body: str
     mass_kg: float
     position_m: np.ndarray
@@ -182,25 +172,20 @@ class Plan:
         return (self.keep.stop - self.keep.start) * self.step_s
 
     def thinned(self, factor: int) -> Plan:
-        """Every `factor`-th sample."""
+        """Every `factor`-th sample, of all arrays that are as long as the plan."""
 
         def thin(part: Any) -> Any:
-            if isinstance(part, np.ndarray):
-                return part[::factor]
             if isinstance(part, dict):
                 return {name: thin(one) for name, one in part.items()}
-            if isinstance(part, Foot):
-                return Foot(*(thin(getattr(part, one.name)) for one in fields(part)))
-            return part.thinned(slice(None, None, factor)) if isinstance(part, Load) else part
+            if isinstance(part, tuple):
+                return tuple(map(thin, part))
+            if isinstance(part, Plan | Foot | Load):
+                return replace(part, **{f.name: thin(getattr(part, f.name)) for f in fields(part)})
+            over_time = isinstance(part, np.ndarray) and len(part) == len(self)
+            return part[::factor] if over_time else part
 
-        over_time = ("angles_rad", "pelvis_angles_rad", "pelvis_m", "feet", "com_height_m", "ball")
-        return replace(
-            self,
-            **{name: thin(getattr(self, name)) for name in over_time},
-            step_s=self.step_s * factor,
-            loads=tuple(map(thin, self.loads)),
-            keep=slice(self.keep.start // factor, -(-self.keep.stop // factor)),
-        )
+        keep = slice(self.keep.start // factor, -(-self.keep.stop // factor))
+        return replace(thin(self), step_s=self.step_s * factor, keep=keep)
 
 
 # --- a movement under construction: arrays that the movements add to, then a plan -----------------

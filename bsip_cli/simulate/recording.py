@@ -16,7 +16,7 @@ from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.kinematics import ground_wrench
 from bsip_cli.simulate.landmarks import Marker, Swing, tissue_of
-from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
+from bsip_cli.simulate.movements import MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import SIDES, Person
@@ -98,10 +98,10 @@ def simulate_trial(
     effects: Sequence[Effect] = (),
 ) -> Trial:
     """Draw a movement, hide effects in it, and make it physically possible."""
-    duration = DEFAULT_DURATION_S[task] if duration_s is None else duration_s
+    movement, usual_s = MOVEMENTS[task]
     for effect in effects:
         person = effect.body(person)
-    plan = MOVEMENTS[task](person, rng, duration, ball_mass_kg)
+    plan = movement(person, rng, usual_s if duration_s is None else duration_s, ball_mass_kg)
     for effect in effects:
         plan = effect.plan(person, plan)
     poses = balanced(person, plan, 1 if plan.flights else THIN)

@@ -245,18 +245,14 @@ def simulate_command(
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     _check_new(study)
-    options = PRESETS[preset_name]
-    if participants is not None:
-        options = replace(options, participants=participants, sexes="")
-    if sequence_s is not None:
-        options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
-    tissue = soft_tissue == "measured"
+    preset, tissue = PRESETS[preset_name], soft_tissue == "measured"
     options = replace(
-        options,
-        seed=options.seed if seed is None else seed,
-        tasks=tuple(tasks) or options.tasks,
-        laboratory=replace(options.laboratory, plate_per_foot=plate_per_foot),
-        richness=replace(options.richness, measured_tissue=tissue, girdle=shoulder_girdle),
+        preset if participants is None else replace(preset, participants=participants, sexes=""),
+        seed=preset.seed if seed is None else seed,
+        tasks=tuple(tasks) or preset.tasks,
+        durations_s=preset.durations_s | ({} if sequence_s is None else {"sequence": sequence_s}),
+        laboratory=replace(preset.laboratory, plate_per_foot=plate_per_foot),
+        richness=replace(preset.richness, measured_tissue=tissue, girdle=shoulder_girdle),
         run=run,
         effects=pair_up(effects, sizes, targets),
         effect_tasks=tuple(effect_tasks),
@@ -344,10 +340,9 @@ _NAMED = re.compile(
 def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dict[str, object]:
     """Hide effects in one recording; returns the truth about it.
 
-    UsageError: an effect that measured data cannot have; a file of another kind.
+    UsageError: a file of another kind.
     BadDataError: the recording cannot take an effect.
     """
-    check_injectable(effects)
     kind = source.suffix.lower()
     if kind not in (".c3d", ".trc"):
         raise UsageError("not a recording", file=source, expected="a .c3d, or a .trc with a .mot")
@@ -357,26 +352,14 @@ def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dic
     return {"recorded_from_s": after.start_s, "effects": [effect.name for effect in effects]}
 
 
-def check_injectable(effects: Sequence[Effect]) -> None:
-    """Refuse effects that measured data cannot have afterwards."""
-    for effect in effects:
-        if not effect.injectable:
-            raise UsageError(
-                f"{effect.name} cannot be hidden in measured data: {effect.hint}",
-                remedy="hide it in a simulated study (bsip simulate)",
-            )
-
-
 def _changed_by(effects: Sequence[Effect], instruments: Instruments, file: Path) -> Instruments:
     """Instruments with all effects, each of which must have changed something."""
+    lacking = {} if instruments.plates else {"plates": "force plates, and there are none"}
+    if not instruments.surfaces_known:
+        lacking["surface"] = "to know where the plates lie, and a MOT file does not say"
     for effect in effects:
-        if "plates" in effect.needs and not instruments.plates:
-            raise BadDataError(f"{effect.name} needs force plates, and there are none", file=file)
-        if "surface" in effect.needs and not instruments.surfaces_known:
-            raise BadDataError(
-                f"{effect.name} needs to know where the plates lie, and a MOT file does not say",
-                file=file,
-            )
+        if why := next((lacking[need] for need in effect.needs if need in lacking), ""):
+            raise BadDataError(f"{effect.name} needs {why}", file=file)
         try:
             changed = effect.injected(instruments)
         except (UsageError, BadDataError) as error:  # what is asked for may be in the other files
@@ -408,7 +391,6 @@ def inject_study(
     if unknown:
         raise UsageError(f"no participants {', '.join(unknown)}", expected=", ".join(people))
     effects = {name: effects_of(options, k) for k, name in enumerate(people, start=1)}
-    check_injectable(effects[people[0]])
     chosen = set(participants or people)
     changed: list[Path] = []
     refused: list[BadDataError] = []

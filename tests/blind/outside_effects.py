@@ -39,7 +39,6 @@ CREEPS_S = 3.0
 RINGS_HZ, RINGS_DAMPED = (7.0, 12.0), 0.05
 
 
-@dataclass(frozen=True, eq=False)
 class BeltVibration(OfEveryPlate, name="outside_belt_vibration"):
     """Plates shake vertically by `size` N at about 5 Hz while somebody stands on them."""
 
@@ -86,7 +85,6 @@ class PlateSaturation(OfEveryPlate, name="outside_plate_saturation"):
         reading[:, 2] *= 1.0 - np.minimum(self.size * (reading[:, 2] / 1000.0) ** 2, 0.5)
 
 
-@dataclass(frozen=True, eq=False)
 class RepeatedFrames(Effect, name="outside_repeated_frames"):
     """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
 
@@ -140,7 +138,6 @@ class LateChannel(ChannelFault, name="outside_late_channel"):
         return np.interp(times_s - self.size, times_s, values)
 
 
-@dataclass(frozen=True, eq=False)
 class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
     """The vertical channel's gain wanders: a contact that opens and closes within seconds.
 
@@ -159,7 +156,6 @@ class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
         reading[:, 2] *= 1.0 + self.size * np.interp(times_s, knots, drawn)
 
 
-@dataclass(frozen=True, eq=False)
 class ClockJump(Effect, name="outside_clock_jump"):
     """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
 
@@ -187,7 +183,6 @@ class PlateCreep(OfEveryPlate, name="outside_plate_creep"):
         reading += self.size * (slow - reading)
 
 
-@dataclass(frozen=True, eq=False)
 class PlateRinging(OfEveryPlate, name="outside_plate_ringing"):
     """The part `size` of every channel goes through a resonance: a plate on a floor that swings."""
 
@@ -221,7 +216,6 @@ class UnevenPlate(OfEveryPlate, name="outside_uneven_plate"):
         reading[:, 2] -= self.size * reading[:, 4]
 
 
-@dataclass(frozen=True, eq=False)
 class HeldSamples(OfEveryPlate, name="outside_held_samples"):
     """The converter stalls: all channels hold their value for moments; `size` is their part."""
 
@@ -271,7 +265,6 @@ class Brake(Load):
         return force, np.cross(r, force)
 
 
-@dataclass(frozen=True, eq=False)
 class CameraBump(Effect, name="outside_camera_bump"):
     """From a moment on all markers are turned by `size` about a level axis through the lab's
     origin: somebody ran into a camera."""

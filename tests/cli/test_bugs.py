@@ -10,7 +10,7 @@ from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import Stage
 from bsip_cli.running import session
 from bsip_cli.running.processes import EndedError
-from bsip_cli.running.runner import Manner, held_alone, run_stages
+from bsip_cli.running.runner import held_alone, run_stages
 from bsip_cli.study.study import load_study
 
 STAGES = {
@@ -49,7 +49,7 @@ def outcomes(empty_study, tmp_path):
     def of(*stages: Stage):
         study, _ = load_study(empty_study, {"static": ("static",), "sequence": ()})
         out = tmp_path / "out"
-        running = run_stages(stages, study, out, load_config([]), Manner(force=True))
+        running = run_stages(stages, study, out, load_config([]), jobs=1, force=True)
         return [(o.stage, o.unit, o.state, o.exit_code, o.sentences) for o in running]
 
     return of

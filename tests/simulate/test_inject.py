@@ -146,7 +146,7 @@ def test_a_tilted_lab_turns_markers_and_forces_together(tmp_path, recorded):
 @pytest.mark.parametrize("name", ["unmeasured_contact", "missing_joint", "segment_inertia"])
 def test_what_would_change_the_movement_is_refused(tmp_path, recorded, name):
     with pytest.raises(UsageError, match="cannot be hidden in measured data"):
-        inject_recording(recorded, tmp_path / "x.c3d", [effect_of(name, 0.3)])
+        inject_command(recorded, tmp_path / "x.c3d", [], 1, [name], [0.3], [], [])
     assert not (tmp_path / "x.c3d").exists()
 
 

@@ -25,7 +25,7 @@ def pair_up(
 
     simulated : whether the effects are for simulated recordings or for measured ones.
     UsageError: unknown effect; not one size for each; targets for some effects only; a size
-        out of bounds or a target that the effect cannot have.
+        out of bounds or a target that the effect cannot have; one that measured data cannot have.
     """
     for name in names:
         if name not in EFFECTS:
@@ -44,6 +44,11 @@ def pair_up(
         effect = drawn(one, np.random.default_rng(0))
         if simulated and isinstance(effect, OnSegment) and effect.segment not in SEGMENTS:
             raise effect.wrong_target(effect.segment)  # only measured data can have it
+        if not simulated and not effect.injectable:
+            raise UsageError(
+                f"{effect.name} cannot be hidden in measured data: {effect.hint}",
+                remedy="hide it in a simulated study (bsip simulate)",
+            )
     return asked
 
 

@@ -8,7 +8,7 @@ the same in every trial that it touches.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 
@@ -42,9 +42,10 @@ class Target:
         return self.settings.get(key, otherwise)
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Base of all effects. A concrete one is a frozen dataclass of its drawn parameters.
+    """Base of all effects; each becomes a frozen dataclass of its drawn parameters.
 
     name : as in `effects.csv`, which has the rest. unit, least, most : of the size, its bounds.
     targets : what a target may be, in words. choices : names that it may have; empty: any.
@@ -73,6 +74,7 @@ class Effect:
     needs: ClassVar[list[str]]
 
     def __init_subclass__(cls, name: str = "") -> None:
+        dataclass(frozen=True, eq=False)(cls)
         if not name:  # a base of several
             return
         row, KINDS[name] = TABLE[name], cls
@@ -133,7 +135,6 @@ class Effect:
         return {"effect": self.name, "target": self.place(), "unit": self.unit, **fields}
 
 
-@dataclass(frozen=True, eq=False)
 class OnSegment(Effect):
     """An effect at a segment, by default at its centre of mass."""
 

@@ -7,7 +7,7 @@ Channels are the six components in the plate's own axes, moments about its senso
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -52,7 +52,6 @@ class FrameRate(Effect, name="frame_rate"):
 # --- plates ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
 class TurnedAxes(Effect):
     """turn_rad : rotation vector, lab axes."""
 
@@ -111,7 +110,6 @@ class OfEveryPlate(Effect, ABC):
         return f"plate {self.plate}" if self.plate else "all plates"
 
 
-@dataclass(frozen=True, eq=False)
 class PlateTranslation(OfEveryPlate, name="plate_translation"):
     """The plate truly lies at its stated place plus shift_m (lab axes).
 
@@ -129,7 +127,6 @@ class PlateTranslation(OfEveryPlate, name="plate_translation"):
         reading[:, 3:] -= np.cross(plate.axes.T @ self.shift_m, reading[:, :3])
 
 
-@dataclass(frozen=True, eq=False)
 class PlateRotation(OfEveryPlate, name="plate_rotation"):
     """The plate is truly turned by turn_rad (rotation vector, lab axes) about its centre."""
 
@@ -157,7 +154,6 @@ def _axis(name: str, rng: np.random.Generator) -> np.ndarray:
 # --- channels -------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
 class ChannelFault(OfEveryPlate):
     """An error of one channel. plate : its number, or 0 for all."""
 
@@ -211,7 +207,6 @@ class PlateDrift(OwnSignal, name="plate_drift"):
         return values + self.size * times_s
 
 
-@dataclass(frozen=True, eq=False)
 class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
     """Channel `to` shows size times channel `source` plus its own."""
 
@@ -244,7 +239,6 @@ CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter interval between gaps is not smoothed
 
 
-@dataclass(frozen=True, eq=False)
 class OnSkin(Effect):
     """A marker moves along the skin, and stays there.
 
@@ -275,7 +269,6 @@ class OnSkin(Effect):
         """(F,) part of the way that it has gone, 0 to 1."""
 
 
-@dataclass(frozen=True, eq=False)
 class MarkerShift(OnSkin, name="marker_shift"):
     """A marker slips along the skin, within SLIP_S, and stays there.
 
@@ -296,7 +289,6 @@ class MarkerShift(OnSkin, name="marker_shift"):
         return step(times_s, start, start + SLIP_S)
 
 
-@dataclass(frozen=True, eq=False)
 class MarkerSlide(OnSkin, name="marker_slide"):
     """A marker slides along the skin for a part of the trial, and stays there.
 
@@ -315,7 +307,6 @@ class MarkerSlide(OnSkin, name="marker_slide"):
         return glide(times_s, start, end, SOFT * (end - start))
 
 
-@dataclass(frozen=True, eq=False)
 class MarkerSwap(Effect, name="marker_swap"):
     """Two markers carry each other's label for `size` seconds.
 
@@ -384,7 +375,6 @@ LANDMARKS = {"knee": ("KNEL", "KNEM"), "ankle": ("MALL", "MALM"), "elbow": ("ELB
 LEAST_RANGE_RAD = 0.25  # a trial that bends the waist less bends the spine less too
 
 
-@dataclass(frozen=True, eq=False)
 class JointCentre(Effect, name="joint_centre"):
     """The true centre lies at shift_m from where its landmarks put it (parent segment's axes).
 
@@ -428,7 +418,6 @@ class MissingJoint(Effect, name="missing_joint"):
         return replace(plan, angles_rad=angles, notes=notes)
 
 
-@dataclass(frozen=True, eq=False)
 class SegmentInertia(Effect, name="segment_inertia"):
     """A segment is heavier by the part `size` of its mass, and so are its second moments.
 

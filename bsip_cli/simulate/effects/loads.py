@@ -38,7 +38,6 @@ CUTOFF_HZ = 10.0
 LOADED_N = 40.0
 
 
-@dataclass(frozen=True, eq=False)
 class AddedMass(OnSegment, name="added_mass"):
     """A small ball of `size` kg on a segment, as of a bag or a cast; the scale did not see it.
 
@@ -66,7 +65,6 @@ class AddedMass(OnSegment, name="added_mass"):
         return with_mass_at(instruments, self.segment, self.size)
 
 
-@dataclass(frozen=True, eq=False)
 class ReleasedObject(OnSegment, name="released_object"):
     """A point mass of `size` kg that a segment carries until it lets go; it falls off the plate.
 
@@ -100,7 +98,6 @@ class ReleasedObject(OnSegment, name="released_object"):
         return with_mass_at(instruments, self.segment, self.size, hold)
 
 
-@dataclass(frozen=True, eq=False)
 class WobblingMass(OnSegment, name="wobbling_mass"):
     """`size` kg of a segment hang on a spring and a damper, equal in all directions.
 
@@ -169,7 +166,6 @@ class Swinging(Load):
         return force, np.cross(r + travel, force)
 
 
-@dataclass(frozen=True, eq=False)
 class Breathing(Effect, name="breathing"):
     """Moved mass times amplitude is `size`; it moves as a sine at the chest."""
 
@@ -194,7 +190,6 @@ class Breathing(Effect, name="breathing"):
 class ChestMotion(Load):
     """Mass that leaves its place in a body: mass times displacement (T, 3), body axes."""
 
-    over_time = ("dipole_kgm",)
     body: str
     position_m: np.ndarray
     dipole_kgm: np.ndarray
@@ -207,7 +202,6 @@ class ChestMotion(Load):
         return force, np.cross(r, force) + np.cross(dipole, acceleration - GRAVITY)
 
 
-@dataclass(frozen=True, eq=False)
 class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
     """A mostly upward force on a segment, as of a rail on a hand, of `size` N on average.
 
@@ -253,7 +247,6 @@ class Support(Load):
     position_m : (3,) in the body's frame. force_n : (T, 3) on the body.
     """
 
-    over_time = ("force_n",)
     body: str
     position_m: np.ndarray
     force_n: np.ndarray
@@ -264,7 +257,6 @@ class Support(Load):
         return -self.force_n, -np.cross(r, self.force_n)
 
 
-@dataclass(frozen=True, eq=False)
 class ExternalForce(OnSegment, name="external_force"):
     """`size` N on a segment's centre of mass, mostly upwards and always the same; not in trials
     with a flight, which would be another one.
@@ -291,7 +283,6 @@ class ExternalForce(OnSegment, name="external_force"):
         return {"upwards_n": float(self.size * self.direction[1])}
 
 
-@dataclass(frozen=True, eq=False)
 class ObjectHandled(OnSegment, name="object_handled"):
     """A point mass of `size` kg that a segment picks up and puts down again, beside the plates.
 
@@ -318,7 +309,6 @@ class ObjectHandled(OnSegment, name="object_handled"):
         return plan.with_load(Ball(body_of(self.segment), self.size, place, hold, end))
 
 
-@dataclass(frozen=True, eq=False)
 class Implement(OnSegment, name="implement"):
     """Two balls of `size` kg together on a line through the hand's centre of mass, held through
     each trial.

@@ -31,7 +31,6 @@ import pandas as pd
 from benchmarks.measure import machine
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
-from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.laboratory import (
     Persons,
     alike_in,
@@ -209,7 +208,7 @@ def judged(
     usual = np.ones(lab.persons.count)
     sums = sums_of(lab.persons, usual)
     alone = replace(lab, found={}, scale=usual, sums=sums)
-    _, covariance = alone.posterior().offset(sums, cause.directions).of_size(SIZES[1])
+    covariance = alone.posterior().offset(sums, cause.directions).covariance
     inside = one.low <= size * typical <= one.high
     return one.value / typical - size, float(np.sqrt(covariance[number, number])), inside
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from
 from bsip_cli.commands import named_causes as named
-from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by, is_fault_of_forces
+from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
@@ -154,7 +154,7 @@ class _Correction:
             elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
                 self.left.append(f"{words}: no plate shows where the axes are")
             elif alike and not all(
-                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect])
+                effect in EFFECTS and EFFECTS[effect].of_the_forces
                 for effect, _ in (*alike, (cause.effect.name, ""))
             ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")

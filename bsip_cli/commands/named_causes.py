@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
-from bsip_cli.diagnosis.cause import Cause, is_fault_of_forces
+from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import Turned
@@ -32,7 +32,7 @@ def called(effect: str, target: str) -> str:
 
 def is_corrected(effect: Effect) -> bool:
     """Of the plates, the clocks, or the axes of laboratory and cameras."""
-    return is_fault_of_forces(effect) or isinstance(effect, Turned)
+    return effect.of_the_forces or isinstance(effect, Turned)
 
 
 def why_left(effect: str, unknown: str, group: str = "") -> str:

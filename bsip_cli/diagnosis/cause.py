@@ -13,13 +13,12 @@ from bsip_cli.effects.plates import (
     ALL,
     Delay,
     PlateRotation,
-    Sized,
-    joint_change,
-    joint_delay_s,
+    corrected,
     loaded_plates,
     plate_of,
+    right_times_s,
 )
-from bsip_cli.effects.scene import Plate, Scene
+from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.methods import OM
 
 
@@ -40,27 +39,43 @@ class Cause:
     folds: np.ndarray
 
 
-def change_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
-    """(N, 6) what causes add to the simulated wrench, about the world's origin [N, N m]."""
-    return joint_change(scene, _sized(causes))
+def change_by(causes: Iterable[Cause], scene: Scene) -> np.ndarray:
+    """(N, 6) what causes add to the simulated wrench, about the world's origin [N, N m].
+
+    Their changes add up, but for delays. Several are one delay: two opposite ones that were added
+    would sharpen the forces, and so make up for what a smoothed motion lacks. And what the plates
+    do wrong comes as late as their forces do.
+    """
+    causes = tuple(causes)
+    late_s = delay_by(causes, scene)
+    of_the_plates, others = np.zeros((2, len(scene.times_s), 6))
+    for one in causes:
+        if not isinstance(one.effect, Delay):
+            mine = of_the_plates if one.effect.of_the_plates else others
+            mine += one.effect.change(scene, one.target, one.values)
+    if not late_s.any():
+        return of_the_plates + others
+    if of_the_plates.any():
+        of_the_plates = CubicSpline(scene.times_s, of_the_plates)(right_times_s(scene, late_s))
+    return of_the_plates + others + corrected(scene, late_s)
 
 
-def delay_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
-    """(N,) how late causes make the forces of each frame [s]."""
-    return joint_delay_s(scene, _sized(causes))
-
-
-def _sized(causes: Sequence[Cause]) -> list[Sized]:
-    return [(c.effect, c.target, c.values) for c in causes]
+def delay_by(causes: Iterable[Cause], scene: Scene) -> np.ndarray:
+    """(N,) how late causes make the forces of each frame, all delays together [s]."""
+    late_s = np.zeros(len(scene.times_s))
+    for one in causes:
+        if isinstance(one.effect, Delay):
+            late_s = late_s + one.effect.late_s(scene, one.values)
+    return late_s
 
 
 def unseen_change_by(causes: Sequence[Cause], scene: Scene, fold: np.ndarray) -> np.ndarray:
     """(N, 6) the same, every frame with the sizes that its fold (N,) did not help to find."""
     change = np.empty((len(fold), 6))
     for number in np.unique(fold):
+        unseen = [replace(one, values=one.folds[number]) for one in causes]
         frames = fold == number
-        sized = [(c.effect, c.target, c.folds[number]) for c in causes]
-        change[frames] = joint_change(scene, sized)[frames]
+        change[frames] = change_by(unseen, scene)[frames]
     return change
 
 
@@ -96,16 +111,6 @@ class Blocks:
 _ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as much of the error
 
 
-def is_of_the_forces(cause: Cause) -> bool:
-    """Whether the measured forces are wrong, and can be corrected."""
-    return is_fault_of_forces(cause.effect)
-
-
-def is_fault_of_forces(effect: Effect) -> bool:
-    """Of the plates, or of the clock that they have."""
-    return effect.of_the_plates or isinstance(effect, Delay)
-
-
 def corrected_wrench(
     scene: Scene, measured: np.ndarray, causes: Sequence[Cause]
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -132,19 +137,16 @@ def corrected_plates(scene: Scene, causes: Sequence[Cause]) -> dict[str, np.ndar
         wrench = np.nan_to_num(plate.wrench)
         for cause in causes:
             if cause.effect.of_the_plates and cause.target.split(" ")[0] in names:
-                wrench = wrench - change_by([cause], _alone(scene, plate, cause, loaded))
+                one = plate
+                if isinstance(cause.effect, PlateRotation) and cause.target == ALL:
+                    middle = np.mean([plate_of(scene, name).centre_m() for name in loaded], axis=0)
+                    one = replace(plate, corners_m=plate.corners_m + middle - plate.centre_m())
+                alone = replace(scene, plates=(one,), wrench=plate.wrench)
+                wrench = wrench - change_by([cause], alone)
         if late_s.any():
             wrench, _ = _earlier(wrench, scene.valid, scene.times_s, late_s)
         found[plate.name] = np.where(np.isfinite(plate.wrench).all(axis=1)[:, None], wrench, np.nan)
     return found
-
-
-def _alone(scene: Scene, plate: Plate, cause: Cause, loaded: Sequence[str]) -> Scene:
-    """The scene with one plate; where all turn together, about the middle that they turn about."""
-    if isinstance(cause.effect, PlateRotation) and cause.target == ALL:
-        middle = np.mean([plate_of(scene, name).centre_m() for name in loaded], axis=0)
-        plate = replace(plate, corners_m=plate.corners_m + middle - plate.centre_m())
-    return replace(scene, plates=(plate,), wrench=plate.wrench)
 
 
 def _earlier(

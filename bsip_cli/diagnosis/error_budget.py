@@ -6,7 +6,7 @@ square; with noise and unknown, which share what no term explains, the shares ad
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations
@@ -14,7 +14,7 @@ from itertools import permutations
 import numpy as np
 from scipy.stats import chi2
 
-from bsip_cli.diagnosis.error_model import ErrorModel, Part
+from bsip_cli.diagnosis.error_model import ErrorModel, Part, TrialErrors
 from bsip_cli.diagnosis.findings import Finding, interval_words
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.nameless import UNEXPLAINED
@@ -108,9 +108,14 @@ class _Budget:
     rng: np.random.Generator
 
     @cached_property
+    def errors(self) -> dict[int, TrialErrors]:
+        """By trial, of those that are asked."""
+        return {t: self.model.session.trials[t] for t in self.trials}
+
+    @cached_property
     def residual(self) -> dict[int, np.ndarray]:
         """By trial (n, 8)."""
-        return {t: self.grounds[t].seen(self.model.trials[t].residual) for t in self.trials}
+        return {t: self.grounds[t].seen(one.residual) for t, one in self.errors.items()}
 
     @cached_property
     def squares(self) -> np.ndarray:
@@ -127,37 +132,50 @@ class _Budget:
         """(8, K) what each coefficient adds to the shares."""
         weights = np.zeros((len(COMPONENTS), len(self.model.mean)))
         for t in self.trials:
-            weights[:, self.model.used[t]] += self._projected(t, self.model.columns[t])
-        return weights / self.squares[:, None]
+            weights[:, self.model.session.used[t]] += self._shares(t, self.model.session.columns[t])
+        return weights
 
-    def _projected(self, trial: int, columns: np.ndarray) -> np.ndarray:
-        """(8, k) of a trial's columns (n, 6, k) on the residual."""
+    def _shares(self, trial: int, columns: np.ndarray) -> np.ndarray:
+        """(8, k) of a trial's columns (n, 6, k)."""
         seen = np.nan_to_num(self.grounds[trial].components * self.residual[trial][:, :, None])
-        return np.tensordot(seen, columns, axes=([0, 2], [0, 1]))
+        return np.tensordot(seen, columns, axes=([0, 2], [0, 1])) / self.squares[:, None]
 
     def lines(self) -> Iterator[Line]:
-        here = tuple(p for p in self.model.parts if p.trial in (-1, *self.trials))
+        here = tuple(p for p in self.model.session.parts if p.trial in (-1, *self.trials))
         terms = list(dict.fromkeys(p.term for p in here))
         alike = self._alike(here, terms)
         for term in terms:
             whole = tuple(p for p in here if p.term == term)
             targets = dict.fromkeys(p.target for p in whole)
-            yield from self._inside(term, tuple(p for p in whole if p in self.model.mixed))
+            yield from self._inside(term, tuple(p for p in whole if p in self.model.session.mixed))
             for target in ("", *(t for t in targets if t and len(targets) > 1)):
                 parts = tuple(p for p in whole if not target or p.target == target)
-                for one in self._of(term, target, parts):
+                changes = {t: self.grounds[t].seen(self._change(parts, t)) for t in self.trials}
+                known = self._spread(parts), self._scale(parts), self._gains(parts)
+                for one in self._lines(term, target, changes, *known):
                     yield replace(one, alike=alike.get((term, one.component), ()))
         yield from self._rest()
         gains, rms = self._gains(here), np.sqrt(self.squares / self.count)
         for k, name in enumerate(COMPONENTS):
             yield Line(TOTAL, "", name, float(rms[k]), 1.0, 1.0, 1.0, gains[k], np.nan)
 
-    def _of(self, term: str, target: str, parts: tuple[Part, ...]) -> Iterator[Line]:
-        changes = {t: self.grounds[t].seen(self._change(parts, t)) for t in self.trials}
+    def _lines(
+        self,
+        term: str,
+        target: str,
+        changes: Mapping[int, np.ndarray],
+        spread: np.ndarray,
+        scale: float,
+        gains: Sequence[ErrorGain] = (_NO_GAIN,) * len(COMPONENTS),
+    ) -> Iterator[Line]:
+        """Of all components, of what it changes (n, 8) in the trials; spread (8,) : standard
+        deviations of the shares."""
         rms = np.sqrt(_sum(x**2 for x in changes.values()) / self.count)
-        share = _sum(changes[t] * self.residual[t] for t in self.trials) / self.squares
-        half = Z95 * self._spread(parts)
-        return _lines(term, target, rms, share, half, self._gains(parts), self._scale(parts))
+        share = _sum(x * self.residual[t] for t, x in changes.items()) / self.squares
+        half = Z95 * spread
+        for k, name in enumerate(COMPONENTS):
+            interval = share[k] - half[k], share[k] + half[k]
+            yield Line(term, target, name, rms[k], share[k], *interval, gains[k], scale)
 
     def _scale(self, parts: tuple[Part, ...]) -> float:
         return float(np.mean([self.model.scales[p.scale] for p in parts]))
@@ -167,45 +185,41 @@ class _Budget:
         if not parts:
             return
         model, mine = self.model, _coefficients(parts)
-        mixed = np.concatenate([model.mixed[p] for p in parts], axis=1)
-        mean, inside = model.mean[mine], model.covariance[np.ix_(mine, mine)]
+        mixed = np.concatenate([model.session.mixed[p] for p in parts], axis=1)
+        inside = model.covariance[np.ix_(mine, mine)]
         bare = {
-            t: next(x for x in model.trials[t].terms if x.scale == parts[0].scale)
-            for t in self.trials
+            t: next(x for x in one.terms if x.scale == parts[0].scale)
+            for t, one in self.errors.items()
         }
         targets = next(iter(bare.values())).targets
         wide = len(mixed) // len(targets)
         for k, target in enumerate(targets):
-            at = slice(wide * k, wide * (k + 1))
-            changes, weights = [], np.zeros((len(COMPONENTS), wide))
-            for t in self.trials:
-                columns = bare[t].columns[..., at]
-                changes.append(self.grounds[t].seen(columns @ (mixed[at] @ mean)))
-                weights += self._projected(t, columns)
-            rms = np.sqrt(_sum(x**2 for x in changes) / self.count)
-            weights = weights @ mixed[at] / self.squares[:, None]
-            half = Z95 * np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
-            yield from _lines(term, target, rms, weights @ mean, half, None, self._scale(parts))
+            rows = slice(wide * k, wide * (k + 1))
+            columns = {t: one.columns[..., rows] for t, one in bare.items()}
+            sizes = mixed[rows] @ model.mean[mine]
+            changes = {t: self.grounds[t].seen(x @ sizes) for t, x in columns.items()}
+            weights = sum(self._shares(t, x) for t, x in columns.items()) @ mixed[rows]
+            spread = np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
+            yield from self._lines(term, target, changes, spread, self._scale(parts))
 
     def _rest(self) -> Iterator[Line]:
         """What no term explains: as much of it as the instruments' noise makes, and the unknown."""
         left = {t: self.grounds[t].seen(self.model.left[t]) for t in self.trials}
-        share = _sum(left[t] * self.residual[t] for t in self.trials) / self.squares
-        noisy = _sum(
-            self.grounds[t].components ** 2 @ self.model.trials[t].noise ** 2 for t in left
-        )
-        noise = np.clip(noisy / self.squares, 0.0, np.maximum(share, 0.0))
+        noisy = _sum(self.grounds[t].components ** 2 @ x.noise**2 for t, x in self.errors.items())
+        found = self._lines(UNKNOWN, "", left, self._spread(self.model.session.parts), np.nan)
         unknown = np.sqrt(np.maximum(_sum(x**2 for x in left.values()) - noisy, 0.0) / self.count)
-        half = Z95 * self._spread(self.model.parts)
-        of_unknown = _lines(UNKNOWN, "", unknown, share - noise, half, None, np.nan)
-        of_noise = _lines(NOISE, "", np.sqrt(noisy / self.count), noise, 0 * half, None, np.nan)
-        for pair in zip(of_unknown, of_noise, strict=True):
-            yield from pair
+        noise = np.sqrt(noisy / self.count)
+        for k, one in enumerate(found):
+            share = np.clip(noisy[k] / self.squares[k], 0.0, max(one.share, 0.0))
+            low, high = one.share_low - share, one.share_high - share
+            known = {"rms": unknown[k], "share_low": low, "share_high": high}
+            yield replace(one, share=one.share - share, **known)
+            yield Line(NOISE, "", one.component, noise[k], share, share, share, _NO_GAIN, np.nan)
 
     def _change(
         self, parts: Sequence[Part], trial: int, mean: np.ndarray | None = None
     ) -> np.ndarray:
-        none = np.zeros_like(self.model.trials[trial].residual)
+        none = np.zeros_like(self.errors[trial].residual)
         return sum((self.model.of(part, trial, mean) for part in parts), none)
 
     def _spread(self, parts: Sequence[Part]) -> np.ndarray:
@@ -228,11 +242,9 @@ class _Budget:
             ground, before = self.grounds[fold.trial], self.residual[fold.trial][fold.rows]
             change = ground.seen(self._change(parts, fold.trial, mean))[fold.rows]
             blocks = ground.blocks[fold.rows]
-            errors.append([(x, x - c, blocks) for x, c in zip(before.T, change.T, strict=True)])
-        return [
-            error_gain(pooled([block_errors(0 * x, x, y, b) for x, y, b in one]), self.rng)
-            for one in zip(*errors, strict=True)
-        ]
+            pairs = zip(before.T, change.T, strict=True)
+            errors.append([block_errors(0 * x, x, x - c, blocks) for x, c in pairs])
+        return [error_gain(pooled([*one]), self.rng) for one in zip(*errors, strict=True)]
 
     def _alike(
         self, here: Sequence[Part], terms: Sequence[str]
@@ -250,23 +262,8 @@ class _Budget:
         return found
 
 
-def _lines(
-    term: str,
-    target: str,
-    rms: np.ndarray,
-    share: np.ndarray,
-    half: np.ndarray,
-    gains: list[ErrorGain] | None,
-    scale: float,
-) -> Iterator[Line]:
-    """Of all components; ``half`` (8,) of the shares' intervals."""
-    for k, name in enumerate(COMPONENTS):
-        bounds, gain = (share[k] - half[k], share[k] + half[k]), gains[k] if gains else _NO_GAIN
-        yield Line(term, target, name, rms[k], share[k], *bounds, gain, scale)
-
-
 def _coefficients(parts: Sequence[Part]) -> np.ndarray:
-    return np.concatenate([np.arange(p.start, p.stop) for p in parts])
+    return np.concatenate([p.coefficients for p in parts])
 
 
 def _sum(parts: Iterable[np.ndarray]) -> np.ndarray:
@@ -336,7 +333,7 @@ def large_errors(
 def _of_trial(
     usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
 ) -> Iterator[_Large]:
-    one = usual.trials[trial]
+    one = usual.session.trials[trial]
     left, measured = ground.seen(usual.left[trial]), ground.measured
     noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
     for k, name in enumerate(COMPONENTS):

@@ -8,7 +8,7 @@ noise of the instruments.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,12 +16,14 @@ import numpy as np
 from scipy.linalg import cho_factor
 from scipy.linalg.lapack import dpotri, dtrtri
 
-from bsip_cli.diagnosis.error_terms import FAULT, Term
+from bsip_cli.diagnosis.error_terms import FAULT, Term, as_simulated
 from bsip_cli.diagnosis.filtering import FLOOR, Filter, recursion_of
+from bsip_cli.effects.scene import Scene
 
 # How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
 # is hardly there or of any size. With four, ordinary errors are rarely three times the usual.
 WEIGHT, WEIGHT_OF_FAULTS = 4.0, 1.0
+BLOCK_S = 1.0  # intervals of time that stand for independent ones
 _STEPS = 25  # of expectation and maximisation
 _ROUNDS = 3  # of what is left
 _NEGLIGIBLE = 0.5  # that a direction may add to the squared residual, whose noise is one
@@ -29,13 +31,39 @@ _NEGLIGIBLE = 0.5  # that a direction may add to the squared residual, whose noi
 
 @dataclass(frozen=True, eq=False)
 class TrialErrors:
-    """A trial's residual (n, 6) and terms, filtered; noise (6,) that its instruments have."""
+    """A trial's residual (n, 6) and terms, filtered; noise (6,) that its instruments have.
+
+    scene : its motion and plates at a slow rate, which faults see. late_as_measured : whether the
+    signal that a fault makes late is the measured one; else the simulated one too.
+    """
 
     name: str
+    scene: Scene
     filter: Filter
     residual: np.ndarray
     terms: tuple[Term, ...]
     noise: np.ndarray
+    late_as_measured: bool = True
+
+    @cached_property
+    def simulated(self) -> Scene:
+        """What faults change: plates that read what is simulated. Of what they measured, which
+        holds the residual, every gain would explain a part of it. What comes late is as measured:
+        the simulated signal lacks what is fast."""
+        shown = as_simulated(self.scene)
+        if not self.late_as_measured:
+            return shown
+        return self.scene.reading(shown.plates, self.scene.measured)
+
+    @property
+    def times_s(self) -> np.ndarray:
+        """(n,) of the filtered samples."""
+        return self.scene.times_s[self.filter.frames]
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """(n,) interval of BLOCK_S that each sample is in."""
+        return ((self.times_s - self.times_s[0]) / BLOCK_S).astype(int)
 
 
 @dataclass(frozen=True)
@@ -49,27 +77,21 @@ class Part:
     start: int
     stop: int
 
-
-@dataclass(frozen=True, eq=False)
-class Fold:
-    """Some samples ``rows`` of a trial, and their part (K', K'), (K',) of the white equations."""
-
-    trial: int
-    rows: np.ndarray
-    used: np.ndarray
-    gram: np.ndarray
-    right: np.ndarray
+    @property
+    def coefficients(self) -> np.ndarray:
+        return np.arange(self.start, self.stop)
 
 
 @dataclass(frozen=True, eq=False)
-class Laid:
-    """The terms of all trials, laid out.
+class Session:
+    """All trials of a person, and their terms laid out.
 
     used : per trial which coefficients (K',) the last axis of its ``columns`` (n, 6, K') is about.
     known : (n, 6) what a named fault adds to a trial at its size.
     mixed : (P, m) of a part, from whose coefficients it turns to those of a term's own columns.
     """
 
+    trials: tuple[TrialErrors, ...]
     parts: tuple[Part, ...]
     used: tuple[np.ndarray, ...]
     columns: tuple[np.ndarray, ...]
@@ -79,10 +101,18 @@ class Laid:
     @property
     def count(self) -> int:
         """Of coefficients."""
-        return max(part.stop for part in self.parts)
+        return self.parts[-1].stop
+
+    @cached_property
+    def scales(self) -> dict[str, np.ndarray]:
+        """The coefficients (k,) that have a scale in common."""
+        found: dict[str, list[np.ndarray]] = {}
+        for part in self.parts:
+            found.setdefault(part.scale, []).append(part.coefficients)
+        return {scale: np.concatenate(mine) for scale, mine in found.items()}
 
 
-def laid_out(trials: Sequence[TrialErrors]) -> Laid:
+def session_of(trials: Sequence[TrialErrors]) -> Session:
     """Columns that matter given the noise; of unit variance before the data."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
@@ -91,37 +121,85 @@ def laid_out(trials: Sequence[TrialErrors]) -> Laid:
             groups.setdefault(key, {})[t] = term
     parts: list[Part] = []
     known, mixed = {}, {}
-    blocks: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
-    stop = 0
+    used: list[list[np.ndarray]] = [[] for _ in trials]
+    columns: list[list[np.ndarray]] = [[] for _ in trials]
+    start = 0
     for key, terms in groups.items():
-        columns = [x.of_unit_variance for x in terms.values()]
-        white = [a / trials[t].noise[:, None] for t, a in zip(terms, columns, strict=True)]
+        units = {t: x.of_unit_variance for t, x in terms.items()}
+        white = [unit / trials[t].noise[:, None] for t, unit in units.items()]
         flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
         values, vectors = np.linalg.eigh(flat.T @ flat)
         turn = vectors[:, values > _NEGLIGIBLE]  # the same covariance by as few as matter
-        part = Part(*key, stop, stop + turn.shape[1])
+        part = Part(*key, start, start + turn.shape[1])
         parts.append(part)
-        stop = part.stop
-        for (t, term), unit in zip(terms.items(), columns, strict=True):
-            blocks[t].append((np.arange(part.start, part.stop), unit @ turn))
+        start = part.stop
+        for t, term in terms.items():
+            used[t].append(part.coefficients)
+            columns[t].append(units[t] @ turn)
             if term.known is not None:
                 known[part, t] = term.known
             if term.mixing is not None:
                 mixed[part] = term.mixing @ turn
-    used = tuple(np.concatenate([u for u, _ in one]) for one in blocks)
-    together = tuple(np.concatenate([a for _, a in one], axis=2) for one in blocks)
-    return Laid(tuple(parts), used, together, known, mixed)
+    together = tuple(np.concatenate(one, axis=2) for one in columns)
+    laid = tuple(np.concatenate(one) for one in used)
+    return Session(tuple(trials), tuple(parts), laid, together, known, mixed)
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorModel(Laid):
+class Noise:
+    """What may be left of a trial: an autoregression of innovations of size (6,) and recursion
+    (6, p)."""
+
+    filter: Filter
+    size: np.ndarray
+    recursion: np.ndarray
+
+    def white(self, columns: np.ndarray) -> np.ndarray:
+        """(6 n, k) of filtered columns (n, 6, k)."""
+        return self.filter.innovations(columns / self.size[:, None], self.recursion)
+
+
+def noise_like(one: TrialErrors, signal: np.ndarray) -> Noise:
+    """Of a signal (n, 6) that may be left of a trial; it is never quieter than the instruments."""
+    spread = np.maximum(signal.std(axis=0), one.noise)
+    share = one.noise / spread
+    recursion = np.stack(
+        [
+            recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
+            for x, s in zip((signal / spread).T, share, strict=True)
+        ]
+    )
+    white = Noise(one.filter, spread, recursion).white(signal[..., None]).reshape(-1, 6)
+    return Noise(one.filter, spread * np.maximum(white.std(axis=0), share), recursion)
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """gram (K', K'), against (K',) : products of white columns about the coefficients ``used``
+    (K',) with themselves and with the residual."""
+
+    used: np.ndarray
+    gram: np.ndarray
+    against: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Fold(Equations):
+    """Of some samples ``rows`` of a trial."""
+
+    trial: int
+    rows: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
     """The posterior of all coefficients.
 
     mean (K,), covariance (K, K) : of the coefficients. scales : how many times as large as usual.
     left : per trial (n, 6) what no term explains. adapt : whether scales follow from the data.
     """
 
-    trials: tuple[TrialErrors, ...]
+    session: Session
     mean: np.ndarray
     covariance: np.ndarray
     scales: dict[str, float]
@@ -131,16 +209,17 @@ class ErrorModel(Laid):
 
     def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
         """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
-        used = self.used[trial]
+        used = self.session.used[trial]
         here = np.flatnonzero((used >= part.start) & (used < part.stop))
         x = (self.mean if mean is None else mean)[used[here]]
-        return self.columns[trial][..., here] @ x + self.known.get((part, trial), 0.0)
+        known = self.session.known.get((part, trial), 0.0)
+        return self.session.columns[trial][..., here] @ x + known
 
     @cached_property
     def without(self) -> tuple[np.ndarray, ...]:
         """Per fold the coefficients (K,), and their scales, of all other folds."""
         others = ([one for one in self.folds if one is not out] for out in self.folds)
-        return tuple(_solution(rest, self, self.adapt)[0] for rest in others)
+        return tuple(_solution(rest, self.session, self.adapt)[0] for rest in others)
 
 
 def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -> ErrorModel:
@@ -149,59 +228,33 @@ def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -
     parts : into so many each trial is cut, of which each is held out in turn.
     adapt : scales from the data; else everything is as large as usual.
     """
-    laid = laid_out(trials)
-    off = [sum((x for (_, t), x in laid.known.items() if t == k), 0.0) for k in range(len(trials))]
-    residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
+    session = session_of(trials)
+    residual = [one.residual for one in trials]
+    for (_, t), known in session.known.items():
+        residual[t] = residual[t] - known
     signals = residual
     for _ in range(_ROUNDS):
-        equations = zip(trials, residual, laid.columns, laid.used, signals, strict=True)
-        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, parts))
-        solution = _solution(folds, laid, adapt)
-        by_trial = zip(residual, laid.columns, laid.used, strict=True)
-        left, signals = zip(*(left_by(*one, *solution[:2]) for one in by_trial), strict=True)
-    return ErrorModel(
-        **vars(laid),
-        trials=tuple(trials),
-        mean=solution[0],
-        covariance=solution[1],
-        scales=solution[2],
-        left=left,
-        folds=folds,
-        adapt=adapt,
-    )
+        folds = tuple(
+            fold
+            for t, signal in enumerate(signals)
+            for fold in _folds(session, t, residual[t], signal, parts)
+        )
+        mean, covariance, scales = _solution(folds, session, adapt)
+        by_trial = zip(residual, session.columns, session.used, strict=True)
+        left, signals = zip(*(left_by(*one, mean, covariance) for one in by_trial), strict=True)
+    return ErrorModel(session, mean, covariance, scales, left, folds, adapt)
 
 
 def _folds(
-    trial: int,
-    one: TrialErrors,
-    residual: np.ndarray,
-    columns: np.ndarray,
-    used: np.ndarray,
-    signal: np.ndarray,
-    parts: int,
+    session: Session, trial: int, residual: np.ndarray, signal: np.ndarray, parts: int
 ) -> Iterator[Fold]:
     """White equations of a trial; ``signal`` (n, 6) is what may be left of it."""
-    size, recursion = white_noise_of(one, signal)
-    rows = one.filter.innovations(columns / size[:, None], recursion)
-    right = one.filter.innovations((residual / size)[..., None], recursion)[:, 0]
+    noise = noise_like(session.trials[trial], signal)
+    white, right = noise.white(session.columns[trial]), noise.white(residual[..., None])[:, 0]
     for part in np.array_split(np.arange(len(signal)), min(parts, len(signal))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
-        yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
-
-
-def white_noise_of(one: TrialErrors, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Size (6,) and recursion (6, p) of a signal (n, 6) that may be left of a trial; it is never
-    quieter than the instruments."""
-    spread = np.maximum(signal.std(axis=0), one.noise)
-    share = one.noise / spread
-    recursion = np.stack(
-        [
-            recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
-            for x, s in zip((signal / spread).T, share, strict=True)
-        ]
-    )
-    white = one.filter.innovations((signal / spread)[..., None], recursion).reshape(-1, 6)
-    return spread * np.maximum(white.std(axis=0), share), recursion
+        mine = white[at].T
+        yield Fold(session.used[trial], mine @ white[at], mine @ right[at], trial, part)
 
 
 def left_by(
@@ -218,24 +271,26 @@ def left_by(
     return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
 
 
+def summed(equations: Iterable[Equations], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(K, K) and (K,) normal equations of some trials, or parts of them."""
+    gram, against = np.zeros((count, count)), np.zeros(count)
+    for one in equations:
+        gram[np.ix_(one.used, one.used)] += one.gram
+        against[one.used] += one.against
+    return gram, against
+
+
 def _solution(
-    folds: Sequence[Fold], laid: Laid, adapt: bool
+    folds: Sequence[Fold], session: Session, adapt: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
     """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""
-    count = laid.count
-    gram, right = np.zeros((count, count)), np.zeros(count)
-    for one in folds:
-        gram[np.ix_(one.used, one.used)] += one.gram
-        right[one.used] += one.right
+    count = session.count
+    gram, right = summed(folds, count)
     shown = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
-    shown[np.unique(np.concatenate([one.used for one in folds]))] = True
+    shown[np.concatenate([one.used for one in folds])] = True
     gram, right = gram[np.ix_(shown, shown)], right[shown]
     place = np.cumsum(shown) - 1
-    at: dict[str, np.ndarray] = {}
-    for part in laid.parts:
-        mine = np.arange(part.start, part.stop)
-        mine = place[mine[shown[mine]]]
-        at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
+    at = {scale: place[mine[shown[mine]]] for scale, mine in session.scales.items()}
     root = np.ones(len(right))
     for _ in range(_STEPS if adapt else 0):
         mean, variance = moments(gram, right, root)

@@ -14,13 +14,10 @@ import pinocchio as pin
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.hypothesis import candidates_of
 from bsip_cli.dynamics.ground_wrench import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.joints import JointCentre
-from bsip_cli.effects.plates import Delay
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
@@ -108,28 +105,23 @@ def error_terms(
         sd_m = JOINT_SD_M[joint.removesuffix("_l").removesuffix("_r")]
         columns = sd_m * centre.tangent(scene, joint, np.zeros(3))
         yield Term(term, joint, term, False, columns)
-    swinging = _skin_inertia(scene)
-    of_markers = _of_markers(scene, landmark_sd_m, skin_factor)
-    for k, (segment, places, skin) in enumerate(of_markers):
+    for segment, places, skin, swinging in _of_markers(scene, landmark_sd_m, skin_factor):
         name = skeleton.segments[segment]
         yield Term(MARKERS, name, MARKERS, False, places)
         yield Term(SKIN, name, f"{SKIN} {name}", True, skin)
-        yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., 2 * k : 2 * k + 2])
+        yield Term(SKIN, name, f"{SKIN} swings", False, swinging)
     yield Term(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
     yield Term(SKIN, "", f"{SKIN} drifts", True, drift(scene))
     yield Term(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
     source = as_simulated(scene)
-    for effect in filter(is_of_instruments, CATALOGUE):
-        for one in candidates_of(effect, scene):
-            if not one.scanned:  # each place, as far as every laboratory has it
-                wrench, name = SHARE * one.signature(source), FAULT + effect.name
-                own = not effect.is_of_laboratory  # a constant fault is the session's
-                yield Term(name, one.target, f"{name} {one.target}", own, wrench)
-
-
-def is_of_instruments(effect: Effect) -> bool:
-    """Whether it is a fault of plates, clocks or the lab's vertical."""
-    return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
+    for effect in CATALOGUE:
+        if not (effect.of_the_forces or isinstance(effect, GravityTilt)):
+            continue  # not of plates, clocks or the lab's vertical
+        name, own = FAULT + effect.name, not effect.is_of_laboratory  # one for the session
+        for target in effect.targets(scene):  # each place, as far as every laboratory has it
+            null = np.zeros(len(effect.parameters(source, target)))
+            wrench = SHARE * effect.signature(source, target, null)
+            yield Term(name, target, f"{name} {target}", own, wrench)
 
 
 def as_simulated(scene: Scene) -> Scene:
@@ -151,9 +143,10 @@ def as_simulated(scene: Scene) -> Scene:
 
 def _of_markers(
     scene: Scene, sd_m: float, skin_factor: float
-) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Per segment with markers: what misplaced markers on it do, and what skin that follows the
-    angles of the joints next to it does, each marker as far as its residuals show."""
+) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    """Per segment with markers: what misplaced markers on it do; what skin that follows the angles
+    of the joints next to it does, each marker as far as its residuals show; and what (N, 6, 2) its
+    skin does if it swings on."""
     rms = _marker_rms_m(scene)
     for segment in np.unique(scene.person.marker_segments).tolist():
         (mine,) = np.nonzero(scene.person.marker_segments == segment)
@@ -166,7 +159,10 @@ def _of_markers(
         together = skin_factor * np.sqrt((rms[mine] ** 2).mean()) * np.sum(parts, axis=0)
         each = [rms[m] * one for m, one in zip(mine, parts, strict=True)]
         skin = [_following(one, signals) for one in (*each, together)]
-        yield segment, places, np.concatenate(skin, axis=2)
+        behind = stays_behind(scene.motion.acceleration_m_s2[:, segment], scene.rate_hz)
+        errors = np.broadcast_to(behind[:, None], (len(behind), len(mine), 3, 2))
+        swinging = scene.response.of(scene.pose_response.of(errors, mine.tolist()))
+        yield segment, places, np.concatenate(skin, axis=2), swinging
 
 
 def _marker_rms_m(scene: Scene) -> np.ndarray:
@@ -202,17 +198,6 @@ def _following(parts: np.ndarray, signals: Sequence[np.ndarray]) -> np.ndarray:
     """(N, 6, 3 j) of parts (3, N, 6, 3) for signals s, s' and s'' (N, j) of each angle."""
     both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, signals, strict=True))
     return np.asarray(both).reshape(*parts.shape[1:3], -1)
-
-
-def _skin_inertia(scene: Scene) -> np.ndarray:
-    """(N, 6, 2 s) changes of the wrench if the skin of each segment swings on, one by one."""
-    columns = []
-    for segment in np.unique(scene.person.marker_segments).tolist():
-        markers = np.flatnonzero(scene.person.marker_segments == segment).tolist()
-        behind = stays_behind(scene.motion.acceleration_m_s2[:, segment], scene.rate_hz)
-        errors = np.broadcast_to(behind[:, None], (len(behind), len(markers), 3, 2))
-        columns.append(scene.pose_response.of(errors, markers))
-    return scene.response.of(np.concatenate(columns, axis=2))
 
 
 def stays_behind(acceleration: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -7,51 +7,72 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.special import logit, logsumexp
 from scipy.stats import chi2
 
-from bsip_cli.diagnosis.fault_model import SIZES, FaultTrial, Fitted, Session
-from bsip_cli.diagnosis.hypothesis import Candidate, candidates_of
+from bsip_cli.diagnosis.error_model import Session, TrialErrors
+from bsip_cli.diagnosis.fault_model import SIZES, Fitted
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.scene import Scene
 
-_BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
+BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
 _BATCH = 60  # candidates whose signatures are filtered at a time
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
-_UNDETERMINED = (
-    1e-3  # part of a parameter, squared, that lies in what the motion does not determine
-)
-_DETERMINED = (
-    1e-5  # of what the likeliest combination of parameters is determined: less is rounding
-)
+# Part of a parameter, squared, that lies in what the motion does not determine.
+_UNDETERMINED = 1e-3
+# Of what the likeliest combination of parameters is determined: less is rounding.
+_DETERMINED = 1e-5
 _MEDIANS = [np.nan, *chi2.median(np.arange(1, 50))]
 
 
-@dataclass(frozen=True)
-class Place:
+class Candidate(NamedTuple):
+    """An effect at one place; ``scanned`` are the values of its parameters that have a scan."""
+
+    effect: Effect
+    target: str
+    scanned: tuple[float, ...]
+
+    def null(self, scene: Scene) -> np.ndarray:
+        """(K,) all parameters where it has no size."""
+        free = self.effect.is_free(scene, self.target)
+        values = np.zeros(len(free))
+        values[~free] = self.scanned
+        return values
+
+
+class Kind(NamedTuple):
+    """What, where and in which trials, whatever the values of a scan."""
+
+    effect: Effect
+    target: str
+    trials: tuple[int, ...]
+
+
+class Place(NamedTuple):
     """A candidate in some of the trials, by their numbers."""
 
     candidate: Candidate
     trials: tuple[int, ...]
 
     @property
-    def kind(self) -> tuple[Effect, str, tuple[int, ...]]:
-        """What, where and in which trials, whatever the values of a scan."""
-        return self.candidate.effect, self.candidate.target, self.trials
+    def kind(self) -> Kind:
+        return Kind(self.candidate.effect, self.candidate.target, self.trials)
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """All places of all effects.
+    """All places of all effects in the trials of a session.
 
     columns : signatures (n, 6, C) of each trial; ``parts``: which of them are a candidate's.
     prior_odds : of one more fault against none; ``log_prior`` (P,) of those that it is just there.
     """
 
+    session: Session
     columns: tuple[np.ndarray, ...]
     parts: tuple[dict[Candidate, slice], ...]
     places: tuple[Place, ...]
@@ -67,6 +88,18 @@ class Library:
             found.setdefault(part.stop - part.start, []).append(k)
         return found
 
+    @cached_property
+    def kinds(self) -> dict[Kind, list[int]]:
+        """Numbers of the places of each kind."""
+        found: dict[Kind, list[int]] = {}
+        for k, place in enumerate(self.places):
+            found.setdefault(place.kind, []).append(k)
+        return found
+
+    def log_prior_of(self, kind: Kind) -> float:
+        """Logarithm of the prior odds of a kind, whatever the values of a scan."""
+        return float(logsumexp(self.log_prior[self.kinds.get(kind, [])]))
+
     def products(
         self, fit: Fitted, trial: int
     ) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
@@ -74,7 +107,7 @@ class Library:
         (K', C), and each candidate's with itself (k, k); once for the same noise and faults."""
         piece = fit.pieces[trial]
         if piece not in self._products:
-            white = fit.whitened(trial, self.columns[trial])
+            white = piece.noise.white(self.columns[trial])
             grams = {c: white[:, s].T @ white[:, s] for c, s in self.parts[trial].items()}
             self._products[piece] = white.T @ piece.right, piece.white.T @ white, grams
         return self._products[piece]
@@ -91,23 +124,37 @@ def library_of(
     asked.
     prior_odds : of one more fault in a person's recordings against none."""
     columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
-    scenes = [one.scene for one in session.trials]
-    places = tuple(_places(parts, scenes, alone))
-    return Library(columns, parts, places, prior_odds, _log_prior(places, prior_odds))
+    places = tuple(_places(parts, [one.scene for one in session.trials], alone))
+    # even over the names of effects, over the effects of a name, and over the places of each
+    counts = Counter(one.candidate.effect for one in places)
+    names = Counter(effect.name for effect in counts)
+    asked = (one.candidate.effect for one in places)
+    shares = [len(names) * names[effect.name] * counts[effect] for effect in asked]
+    log_prior = np.log(prior_odds) - np.log(shares)
+    return Library(session, columns, parts, places, prior_odds, log_prior)
 
 
 def _signatures(
-    trial: FaultTrial, effects: Sequence[Effect]
+    trial: TrialErrors, effects: Sequence[Effect]
 ) -> tuple[np.ndarray, dict[Candidate, slice]]:
-    scene, filter_ = trial.scene, trial.errors.filter
-    candidates = [c for effect in effects for c in candidates_of(effect, scene)]
-    ends = np.cumsum([0, *(len(c.free(scene)) for c in candidates)]).tolist()
-    columns = np.zeros((*trial.errors.residual.shape, ends[-1]), np.float32)
+    scene = trial.scene
+    candidates = [
+        Candidate(effect, target, scanned)
+        for effect in effects
+        for target in effect.targets(scene)
+        for scanned in effect.scans(scene, target)
+    ]
+    counts = [int(one.effect.is_free(scene, one.target).sum()) for one in candidates]
+    ends = np.cumsum([0, *counts]).tolist()
+    columns = np.zeros((*trial.residual.shape, ends[-1]), np.float32)
     parts = {}
     for first in range(0, len(candidates), _BATCH):
         batch = candidates[first : first + _BATCH]
-        signatures = [c.signature(trial.simulated) for c in batch]
-        filtered = filter_(np.concatenate(signatures, axis=2))
+        signatures = [
+            one.effect.signature(trial.simulated, one.target, one.null(trial.simulated))
+            for one in batch
+        ]
+        filtered = trial.filter(np.concatenate(signatures, axis=2))
         mine = ends[first : first + len(batch) + 1]
         columns[..., mine[0] : mine[-1]] = filtered
         for candidate, (start, stop) in zip(batch, pairwise(mine), strict=True):
@@ -125,24 +172,13 @@ def _places(
         for candidate in parts[t]:
             if held[candidate] == 1 or not candidate.effect.of_the_body:
                 yield Place(candidate, (t,))
-    for candidate in dict.fromkeys(c for one in parts for c in one):
+    for candidate in held:
         effect, target = candidate.effect, candidate.target
         asked = alone if effect.while_moving else range(len(parts))
         held_in = (t for t in asked if candidate in parts[t])
         holding = tuple(t for t in held_in if effect.is_shared_at(scenes[t], target))
         if effect.is_shared and len(holding) > 1:
             yield Place(candidate, holding)
-
-
-def _log_prior(places: Sequence[Place], prior_odds: float) -> np.ndarray:
-    """Even over the names of effects, over the effects of a name, and over the places of each."""
-    counts = Counter(one.candidate.effect for one in places)
-    names = Counter(effect.name for effect in counts)
-    shares = [
-        len(names) * names[one.candidate.effect.name] * counts[one.candidate.effect]
-        for one in places
-    ]
-    return np.log(prior_odds) - np.log(shares)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +190,10 @@ class Scores:
     sizes: tuple[np.ndarray, ...]
     information: tuple[np.ndarray, ...]
     inflation: np.ndarray
+
+    def inflation_in(self, trials: Sequence[int]) -> float:
+        """Of a fault in some trials together."""
+        return float(self.inflation[list(trials)].mean())
 
 
 def scores_of(library: Library, fit: Fitted) -> Scores:
@@ -183,10 +223,10 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
         least = 1e-9 * np.trace(whole, axis1=1, axis2=2) + 1e-300  # less is rounding
         values = np.maximum(values, least[:, None])
         along = np.einsum("nki,nk->ni", vectors, pull)
-        added = values[:, None] + 1 / _BEFORE[:, None] ** 2
+        added = values[:, None] + 1 / BEFORE[:, None] ** 2
         gains = 0.5 * (along[:, None] ** 2 / added).sum(axis=2)
-        gains -= 0.5 * np.log(added * _BEFORE[:, None] ** 2).sum(axis=2)
-        log_factor[mine] = logsumexp(gains, axis=1) - np.log(len(_BEFORE))
+        gains -= 0.5 * np.log(added * BEFORE[:, None] ** 2).sum(axis=2)
+        log_factor[mine] = logsumexp(gains, axis=1) - np.log(len(BEFORE))
         best = added[np.arange(len(mine)), np.argmax(gains, axis=1)]
         likeliest = np.einsum("nki,ni->nk", vectors, along / best)
         determined = values > 1.0  # of which the recording shows a typical size
@@ -209,39 +249,31 @@ class Limit:
     """Size of one parameter, the effect's others free, that would have been named; infinite where
     no possible one would."""
 
-    place: Place
+    kind: Kind
     parameter: str
     unit: str
     size: float
 
 
-def limits_of(
-    session: Session, library: Library, scores: Scores, named_from: float
-) -> Iterator[Limit]:
+def limits_of(library: Library, scores: Scores, named_from: float) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone; what is of the body cannot
     be in one trial alone. Of moments, frequencies and windows the median counts: half of them show
     the fault better.
     """
-    limits: dict[tuple, list[Limit]] = {}
-    kinds: dict[tuple, float] = {}
-    for place, prior in zip(library.places, library.log_prior, strict=True):
-        kinds[place.kind] = np.logaddexp(kinds.get(place.kind, -np.inf), prior)
-    for place, information in zip(library.places, scores.information, strict=True):
-        effect = place.candidate.effect
+    for kind, mine in library.kinds.items():
+        effect = kind.effect
         if effect.name == UNEXPLAINED:
             continue
-        inflation = float(scores.inflation[list(place.trials)].mean())
-        spreads = np.sqrt(inflation) * _spreads(information)
-        needed = float(logit(named_from)) - kinds[place.kind]
-        scene = session.trials[place.trials[0]].scene
-        for parameter, sd in zip(place.candidate.free(scene), spreads, strict=True):
-            size = named_size(sd, needed) * parameter.typical
-            size = max(size, effect.least_named.get(parameter.name, 0.0))
+        inflation = np.sqrt(scores.inflation_in(kind.trials))
+        needed = float(logit(named_from)) - library.log_prior_of(kind)
+        parameters = effect.parameters(library.session.trials[kind.trials[0]].scene, kind.target)
+        spreads = np.stack([inflation * _spreads(scores.information[k]) for k in mine])
+        free = (p for p in parameters if not p.scan)
+        for parameter, each in zip(free, spreads.T, strict=True):
+            sizes = sorted(named_size(float(sd), needed) * parameter.typical for sd in each)
+            size = max(sizes[len(mine) // 2], effect.least_named.get(parameter.name, 0.0))
             size = size if size < parameter.most else np.inf
-            key = (place.kind, parameter.name)
-            limits.setdefault(key, []).append(Limit(place, parameter.name, parameter.unit, size))
-    for mine in limits.values():
-        yield sorted(mine, key=lambda one: one.size)[len(mine) // 2]
+            yield Limit(kind, parameter.name, parameter.unit, size)
 
 
 def named_size(sd: float, needed: float) -> float:

@@ -10,15 +10,15 @@ along a little with every candidate.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, refined, sized
-from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
-from bsip_cli.diagnosis.held_out import Uneven, can_be_uneven, plain, unevenness
+from bsip_cli.diagnosis.fault_model import Fitted, corrected, fitted, refined, sized
+from bsip_cli.diagnosis.fault_scores import Kind, Library, Scores, scores_of
+from bsip_cli.diagnosis.held_out import unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.nameless import UNEXPLAINED, Course, Mean
@@ -32,13 +32,16 @@ _MOST = 8  # faults of a person
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A fault in full given others: with its fit, logarithms of the prior odds and of the odds
-    against its absence."""
+    """A fault in full given others: the fit whose last it is, logarithms of the prior odds and of
+    the odds against its absence."""
 
-    fault: Hypothesis
     fit: Fitted
     log_prior: float
     log_odds: float = np.nan
+
+    @property
+    def fault(self) -> Hypothesis:
+        return self.fit.faults[-1]
 
     def weighed(self, before: Fitted, inflation: np.ndarray) -> Tried:
         """With its odds against ``before``, the fit without it; inflation (T,)."""
@@ -46,15 +49,6 @@ class Tried:
         rest = self.fit.log_evidence - before.log_evidence - each.sum()
         odds = self.log_prior + float((each / inflation).sum()) + float(rest)
         return replace(self, log_odds=odds)
-
-    def evenly_or_not(self, inflation: np.ndarray, prior_odds: float) -> Iterator[Tried]:
-        """Itself, and what acts like it but not evenly; prior_odds : of the second to the first."""
-        yield self
-        if can_be_uneven(self.fault.effect):
-            number = self.fit.faults.index(self.fault)
-            log = unevenness(self.fit, number, inflation) + np.log(prior_odds)
-            fault = replace(self.fault, effect=Uneven(self.fault.effect))
-            yield replace(self, fault=fault, log_odds=self.log_odds + log)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,60 +78,59 @@ class Found:
     scores: Scores
 
 
-def search(
-    session: Session, library: Library, named_from: float, known: Sequence[Hypothesis] = ()
-) -> Found:
+def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()) -> Found:
     """named_from : probability from which on one name is said; else so many as hold it. known :
     faults that are there for other reasons; they come first in the fit and have no verdict."""
-    fit = fitted(session, known)
+    fit = fitted(library.session, known)
     for _ in range(_MOST):
-        tried = one_round(session, library, fit)
+        tried = one_round(library, fit)
         if not tried or tried[0].log_odds < 0:
             break
-        fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
+        fit = corrected(fitted(library.session, tried[0].fit.faults, start=tried[0].fit))
         fit = _unnamed_if_uneven(library, fit)
-    fit, verdicts = _judged(session, library, fit, named_from, len(known))
+    fit, verdicts = _judged(library, fit, named_from, len(known))
     sure = [one for one in verdicts if one.probability >= named_from]
-    said = {_where(x.fault) for one in sure for x, _ in one.members}
+    said = {(*x.fault.key, x.fault.trials) for one in sure for x, _ in one.members}
     hardly = [(one.fault, float(expit(one.log_odds))) for one in tried]
     for verdict in verdicts:
         unsure = [] if verdict in sure else [(x.fault, p) for x, p in verdict.members]
         hardly += [*unsure, *verdict.others]
     best: dict[tuple, tuple[Hypothesis, float]] = {}
     for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
-        if _where(one) not in said:
-            best.setdefault(_where(one), (one, probability))
+        place = (*one.key, one.trials)
+        if place not in said:
+            best.setdefault(place, (one, probability))
     return Found(fit, tuple(verdicts), tuple(best.values()), scores_of(library, fit))
 
 
-def _where(one: Hypothesis) -> tuple[str, str, tuple[int, ...]]:
-    """What, at which place and in which trials."""
-    return (*one.key, one.trials)
+def _can_be_uneven(one: Hypothesis) -> bool:
+    """A rail is touched now more, now less; what trials share is as it is."""
+    return one.effect.is_shared and one.name != UNEXPLAINED
+
+
+def _unnamed(fit: Fitted) -> Fitted:
+    """The last fault without its name: nothing more is asked of its trials then."""
+    *others, last = fit.faults
+    return replace(fit, faults=(*others, replace(last, is_even=False)))
 
 
 def _unnamed_if_uneven(library: Library, fit: Fitted) -> Fitted:
-    """The last fault without its name, if it is likelier of another size in every second: nothing
-    more is asked of its trials then."""
-    *others, last = fit.faults
-    if not can_be_uneven(last.effect):
+    """If the last fault is likelier of another size in every second."""
+    if not _can_be_uneven(fit.faults[-1]):
         return fit
     inflation = scores_of(library, fit).inflation
-    log = unevenness(fit, len(others), inflation) + np.log(library.prior_odds)
-    if log < 0:
-        return fit
-    return replace(fit, faults=(*others, replace(last, effect=Uneven(last.effect))))
+    log = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
+    return fit if log < 0 else _unnamed(fit)
 
 
 def _judged(
-    session: Session, library: Library, fit: Fitted, named_from: float, known: int
+    library: Library, fit: Fitted, named_from: float, known: int
 ) -> tuple[Fitted, list[Verdict]]:
     """Each fault given the others; one that is likelier absent goes, the least likely first."""
     while True:
         inflation = scores_of(library, fit).inflation
-        verdicts = [
-            _verdict(session, library, fit, k, named_from, inflation)
-            for k in range(known, len(fit.faults))
-        ]
+        numbers = range(known, len(fit.faults))
+        verdicts = [_verdict(library, fit, k, named_from, inflation) for k in numbers]
         weakest = min(verdicts, key=lambda one: one.probability, default=None)
         if weakest is None or weakest.probability > 0.5:
             return fit, verdicts
@@ -145,35 +138,35 @@ def _judged(
 
 
 def _verdict(
-    session: Session,
-    library: Library,
-    fit: Fitted,
-    number: int,
-    named_from: float,
-    inflation: np.ndarray,
+    library: Library, fit: Fitted, number: int, named_from: float, inflation: np.ndarray
 ) -> Verdict:
-    one = replace(fit.faults[number], effect=plain(fit.faults[number].effect))
+    """Of the probability that a fault or another in its place is there, the shares of each."""
+    one = replace(fit.faults[number], is_even=True)
     others = [other for k, other in enumerate(fit.faults) if k != number]
-    without = fitted(session, others, start=fit)
-    again = fitted(session, (*others, one), start=without, whole=False)
-    mine = {one.key: Tried(one, again, _prior_of(library, one))}
-    for other in _in_full(session, library, without, set(one.trials)):
+    without = fitted(fit.session, others, start=fit)
+    again = fitted(fit.session, (*others, one), start=without, whole=False)
+    prior = library.log_prior_of(Kind(one.effect, one.target, one.trials))
+    mine = {one.key: Tried(again, prior)}
+    for other in _in_full(library, without, set(one.trials)):
         mine.setdefault(other.fault.key, other)
     mine |= {other.fault.key: other for other in _means_of_nameless(without, one)}
     mine = {key: x.weighed(without, inflation) for key, x in mine.items()}
     odds = library.prior_odds
-    if any(x.effect.name == UNEXPLAINED and set(x.trials).isdisjoint(one.trials) for x in others):
+    if any(x.name == UNEXPLAINED and set(x.trials).isdisjoint(one.trials) for x in others):
         odds = 1.0  # what has no name in one trial is in another as likely as not
         for key, x in mine.items():
-            if x.fault.effect.name == UNEXPLAINED:
+            if x.fault.name == UNEXPLAINED:
                 mine[key] = replace(x, log_odds=x.log_odds - np.log(library.prior_odds))
-    others_evenly = (x for key, x in mine.items() if key != one.key)
-    weighed = [*mine[one.key].evenly_or_not(inflation, odds), *others_evenly]
-    weighed.sort(key=lambda x: -x.log_odds)
+    weighed = [mine.pop(one.key)]
+    if _can_be_uneven(one):
+        (itself,) = weighed
+        log = unevenness(itself.fit, len(others), inflation) + np.log(odds)
+        weighed.append(replace(itself, fit=_unnamed(itself.fit), log_odds=itself.log_odds + log))
+    weighed = sorted([*weighed, *mine.values()], key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
     shares: dict[Tried, float] = {}
-    unnamed = [x for x in weighed if x.fault.effect.name == UNEXPLAINED]
+    unnamed = [x for x in weighed if x.fault.name == UNEXPLAINED]
     for each, share in zip(weighed, np.exp(logs - logsumexp(logs)).tolist(), strict=True):
         name = unnamed[0] if each in unnamed else each  # without a name they are all one
         shares[name] = shares.get(name, 0.0) + share
@@ -187,31 +180,25 @@ def _verdict(
 def _means_of_nameless(without: Fitted, one: Hypothesis) -> Iterator[Tried]:
     """What errors without a name in a fault's trials are on average, if not zero: no fault is
     needed for it, so nothing is rare about it."""
-    if one.effect.name == UNEXPLAINED:
+    if one.name == UNEXPLAINED:
         return
     for number, other in enumerate(without.faults):
         if not isinstance(other.effect, Course) or set(one.trials).isdisjoint(other.trials):
             continue
         values = without.values_at(number, without.mean)
-        scene, target = other.scene(without.session), Mean.target_of(other.target)
-        sizes = other.effect.sizes(scene, other.target, values)
-        fault = Hypothesis(Mean(sizes), target, other.trials, np.zeros(len(sizes)))
+        sizes = other.effect.sizes(other.scene, other.target, values)
+        effect, target = Mean(sizes), Mean.target_of(other.target)
+        fault = replace(other, effect=effect, target=target, values=np.zeros(len(sizes)))
         if (fit := _with_one_more(without, without, fault)) is not None:
             size, scale = (x[fit.coefficients(-1)] for x in (fit.mean, fit.root))
             prior = float((0.5 * (size / scale) ** 2 - 0.5 * size**2 + np.log(scale)).sum())
-            yield Tried(fit.faults[-1], fit, prior)
+            yield Tried(fit, prior)
 
 
-def _prior_of(library: Library, one: Hypothesis) -> float:
-    """Logarithm of the prior odds of a fault, whatever the values of a scan."""
-    kind = (one.effect, one.target, one.trials)
-    return float(logsumexp(library.log_prior[[x.kind == kind for x in library.places]]))
-
-
-def one_round(session: Session, library: Library, fit: Fitted) -> list[Tried]:
+def one_round(library: Library, fit: Fitted) -> list[Tried]:
     """The likeliest candidates in full given a fit's faults, the likeliest first; how much of them
     is chance is seen next to the best one."""
-    tried = _in_full(session, library, fit)
+    tried = _in_full(library, fit)
     if not tried:
         return []
     best = max(tried, key=lambda one: one.fit.log_evidence)
@@ -219,67 +206,58 @@ def one_round(session: Session, library: Library, fit: Fitted) -> list[Tried]:
     return sorted((one.weighed(fit, inflation) for one in tried), key=lambda one: -one.log_odds)
 
 
-def _in_full(
-    session: Session, library: Library, fit: Fitted, trials: set[int] | None = None
-) -> list[Tried]:
+def _in_full(library: Library, fit: Fitted, trials: set[int] | None = None) -> list[Tried]:
     """The likeliest candidates, those that touch some of ``trials``, fitted."""
     scores = scores_of(library, fit)
-    divided = [
-        f / scores.inflation[list(p.trials)].mean()
-        for f, p in zip(scores.log_factor, library.places, strict=True)
-    ]
-    log = np.array(divided) + library.log_prior
-    tried: list[tuple[Tried, list[Hypothesis]]] = []
-    for mine in _chosen(library, fit, log, trials):
-        likely = _far_from_each_other(fit, library, mine, log)
-        starts = [_start(session, library.places[k], scores.sizes[k]) for k in likely]
-        while starts:
-            if (now := _with_one_more(fit, fit, starts.pop(0))) is not None:
-                prior = float(logsumexp(library.log_prior[mine]))
-                tried.append((Tried(now.faults[-1], now, prior), starts))
-                break
+    inflation = [scores.inflation_in(place.trials) for place in library.places]
+    log = scores.log_factor / inflation + library.log_prior
+    tried: list[tuple[Tried, Iterator[Hypothesis]]] = []
+    for kind in _chosen(library, fit, log, trials):
+        starts = _starts(library, scores, kind, log)
+        fits = (_with_one_more(fit, fit, one) for one in starts)
+        if (now := next((one for one in fits if one is not None), None)) is not None:
+            tried.append((Tried(now, library.log_prior_of(kind)), starts))
     tried.sort(key=lambda one: -one[0].log_prior - one[0].fit.log_evidence)
-    scanned = [k for k, (one, _) in enumerate(tried) if not one.fault.is_free(session).all()]
+    scanned = [k for k, (one, _) in enumerate(tried) if not one.fault.is_free.all()]
+    found = [one for one, _ in tried]
     for k in scanned[:_POLISHED]:
-        tried[k] = _polished(fit, *tried[k]), []
-    return [one for one, _ in tried]
+        found[k] = _polished(fit, *tried[k])
+    return found
 
 
-def _polished(fit: Fitted, one: Tried, starts: Sequence[Hypothesis]) -> Tried:
+def _polished(fit: Fitted, one: Tried, starts: Iterable[Hypothesis]) -> Tried:
     """With the best of other moments, frequencies or windows, and these sought once more given the
     noise that it leaves: before it was found, it was taken for noise."""
     fits = [one.fit, *(_with_one_more(fit, fit, start) for start in starts)]
     now = max((x for x in fits if x is not None), key=lambda x: x.log_evidence)
     quiet = fitted(fit.session, fit.faults, start=now, whole=False, same_noise=True)
     again = _with_one_more(fit, quiet, now.faults[-1])
-    now = max(now, again or now, key=lambda x: x.log_evidence)
-    return replace(one, fault=now.faults[-1], fit=now)
+    return replace(one, fit=max(now, again or now, key=lambda x: x.log_evidence))
 
 
 def _chosen(
     library: Library, fit: Fitted, log: np.ndarray, asked: set[int] | None
-) -> Iterator[list[int]]:
-    """The likeliest kinds of places, each with its values of a scan; no effect takes all of them.
+) -> Iterator[Kind]:
+    """The likeliest kinds of places; no effect takes all of them.
 
     Where an error without a name is in the model already nothing more can be named: what it leaves
     has no name either. What stands beside it may be another of the named ones.
     """
     known = {(*one.key, t) for one in fit.faults for t in one.trials}
-    unnamed = (one for one in fit.faults if one.effect.name == UNEXPLAINED)
+    unnamed = (one for one in fit.faults if one.name == UNEXPLAINED)
     closed = {t for one in unnamed for t in one.trials} if asked is None else set()
-    kinds: dict[tuple[Effect, str, tuple[int, ...]], list[int]] = {}
-    for k, place in enumerate(library.places):
-        effect, target, trials = place.kind
+    kinds = {}
+    for kind, mine in library.kinds.items():
+        effect, target, trials = kind
         new = all((effect.name, target, t) not in known for t in trials)
         if new and closed.isdisjoint(trials) and (asked is None or asked & set(trials)):
-            kinds.setdefault(place.kind, []).append(k)
-    ranked = sorted(kinds.items(), key=lambda kind: -logsumexp(log[kind[1]]))
+            kinds[kind] = logsumexp(log[mine])
     taken: Counter[tuple[Effect, bool]] = Counter()
-    for (effect, _, trials), mine in ranked:
-        lasting = (effect, len(trials) > 1)
+    for kind in sorted(kinds, key=lambda kind: -kinds[kind]):
+        lasting = (kind.effect, len(kind.trials) > 1)
         if taken[lasting] < _OF_A_KIND:
             taken[lasting] += 1
-            yield mine
+            yield kind
         if taken.total() >= _TRIED:
             return
 
@@ -288,32 +266,22 @@ def _with_one_more(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None
     """The model with one more fault, sized given the noise of a fit with the same others; None if
     it is not possible."""
     one = sized(noise, refined(noise, one))
-    if not one.is_possible(fit.session):
+    if not one.is_possible():
         return None
     return fitted(fit.session, (*fit.faults, one), start=noise, whole=False)
 
 
-def _far_from_each_other(
-    fit: Fitted, library: Library, mine: list[int], log: np.ndarray
-) -> list[int]:
-    """The likeliest values of a scan that are further apart than a finer search looks."""
-    chosen: list[int] = []
+def _starts(library: Library, scores: Scores, kind: Kind, log: np.ndarray) -> Iterator[Hypothesis]:
+    """A kind of the likeliest values of a scan that are further apart than a finer search looks,
+    with the sizes of one linear step."""
+    effect, target, trials = kind
+    scene = library.session.trials[trials[0]].scene
     reached: list[tuple[np.ndarray, np.ndarray]] = []  # by a search from each of them
-    for k in sorted(mine, key=lambda k: -log[k]):
-        candidate, at = library.places[k].candidate, np.array(library.places[k].candidate.scanned)
+    for k in sorted(library.kinds[kind], key=lambda k: -log[k]):
+        candidate = library.places[k].candidate
+        at, null = np.array(candidate.scanned), candidate.null(scene)
         if all((np.abs(at - other) > reach).any() for other, reach in reached):
-            scene = fit.session.trials[library.places[k].trials[0]].scene
-            null = candidate.values(scene, np.zeros(len(candidate.free(scene))))
-            reached.append((at, candidate.effect.spacing(scene, candidate.target, null)))
-            chosen.append(k)
-        if len(chosen) == (_STARTS if len(at) else 1):
-            break
-    return chosen
-
-
-def _start(session: Session, place: Place, sizes: np.ndarray) -> Hypothesis:
-    scene = session.trials[place.trials[0]].scene
-    null = place.candidate.values(scene, np.zeros(len(sizes)))
-    return Hypothesis(place.candidate.effect, place.candidate.target, place.trials, null).moved(
-        session, sizes
-    )
+            reached.append((at, effect.spacing(scene, target, null)))
+            yield Hypothesis(effect, target, trials, null, library.session).moved(scores.sizes[k])
+        if len(reached) == (_STARTS if len(at) else 1):
+            return

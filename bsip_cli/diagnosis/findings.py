@@ -12,9 +12,9 @@ import numpy as np
 
 from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
-from bsip_cli.diagnosis.held_out import HeldOut, plain
+from bsip_cli.diagnosis.held_out import HeldOut
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.effects.effect import Effect, Judged, Number, Reported, Words
+from bsip_cli.effects.effect import Judged, Number, Reported, Words
 
 DRAWS = 200
 SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
@@ -40,13 +40,6 @@ class Finding(Judged):
         )
 
 
-def scope_of(effect: Effect) -> str:
-    """How far a fault reaches, if it is there."""
-    if effect.is_of_laboratory:
-        return "laboratory"
-    return "person" if effect.is_of_person else "trial"
-
-
 def findings_of(
     found: Found, held: HeldOut, named_from: float, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
@@ -57,7 +50,10 @@ def findings_of(
         if verdict.probability >= named_from:  # else it stands with those that are not said
             class_id = "" if len(verdict.members) == 1 else next(names)
             findings += _members(found, held, verdict, class_id, rng)
-    return (*findings, *(_rejected(found.fit, *one) for one in found.rejected))
+    for one, probability in found.rejected:
+        numbers = tuple(Number(*x) for x in one.reported())
+        findings.append(_finding(one, numbers, one.words(), probability, verdict="rejected"))
+    return tuple(findings)
 
 
 def _members(
@@ -65,73 +61,54 @@ def _members(
 ) -> Iterator[Finding]:
     """One of a name of its own, or all of a group."""
     mine = found.fit.faults[verdict.number]
-    mine = replace(mine, effect=plain(mine.effect))
     for tried, probability in verdict.members:
-        plainly = replace(tried.fault, effect=plain(tried.fault.effect))
         more: dict[str, Any] = {}
-        fit, number = tried.fit, len(tried.fit.faults) - 1
-        if (*plainly.key, plainly.trials) == (*mine.key, mine.trials):
+        fit, number, one = tried.fit, len(tried.fit.faults) - 1, tried.fault
+        if (one.effect, one.target, one.trials) == (mine.effect, mine.target, mine.trials):
             fit, number = found.fit, verdict.number
+            one = replace(mine, is_even=one.is_even)
             more["gain"] = held.gain(number).interval()
-        numbers = _numbers(fit, number, found.scores.inflation, rng)
-        one = replace(fit.faults[number], effect=tried.fault.effect)
-        closing = interval_words(numbers)
+        numbers = _numbers(fit, number, found.scores.inflation_in(one.trials), rng)
+        more["closing"] = interval_words(numbers)
         if class_id:
-            closing += f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
+            alike = f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
+            more["closing"] += alike
             more |= {"verdict": "ambiguous", "class_id": class_id}
         else:
             probability = verdict.probability
-        words = one.alike(fit.session)[0].words(fit.session)
-        yield _finding(fit, one, numbers, words, probability, closing=closing, **more)
-
-
-def _rejected(fit: Fitted, one: Hypothesis, probability: float) -> Finding:
-    numbers = tuple(Number(*x) for x in one.reported(fit.session))
-    return _finding(fit, one, numbers, one.words(fit.session), probability, verdict="rejected")
+        yield _finding(one, numbers, one.alike()[0].words(), probability, **more)
 
 
 def _finding(
-    fit: Fitted,
-    one: Hypothesis,
-    numbers: tuple[Number, ...],
-    words: Words,
-    probability: float,
-    **more: Any,
+    one: Hypothesis, numbers: tuple[Number, ...], words: Words, probability: float, **more: Any
 ) -> Finding:
     """With the change of the component that changes most, in its trial of the largest change."""
-    trials = [fit.session.trials[t] for t in one.trials]
-    changes = [
-        x.errors.filter.one(one.effect.change(x.simulated, one.target, one.values)) for x in trials
-    ]
+    changes = [one.filtered_change(trial) for trial in one.in_trials]
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
     most = float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
-    said = one.effect.name, one.target, tuple(x.name for x in trials), numbers, words
-    more |= {"scope": scope_of(one.effect), "rms_change": most}
+    said = one.name, one.target, tuple(x.name for x in one.in_trials), numbers, words
+    more |= {"scope": one.scope, "rms_change": most}
     return Finding(*said, 1 - probability, probability, **more)
 
 
 def _numbers(
-    fit: Fitted, number: int, inflation: np.ndarray, rng: np.random.Generator
+    fit: Fitted, number: int, inflation: float, rng: np.random.Generator
 ) -> tuple[Number, ...]:
     """What is reported of a fault, with the intervals of draws from the posterior.
 
     Its variance counts as many times as the trials' candidates explain more than chance; what no
     recording betters comes on top.
     """
-    session, one = fit.session, fit.faults[number]
-    mine = fit.coefficients(number)
-    covariance = fit.covariance[mine, mine] * inflation[list(one.trials)].mean()
-    free, typical = one.is_free(session), one.typical(session)
-    known_to = np.array([p.known_to for p in one.parameters(session)])
-    spread = np.hypot(known_to, SCALE_ERROR * one.values * free)
-    steps = rng.multivariate_normal(np.zeros(len(typical)), covariance, DRAWS, check_valid="ignore")
+    one, mine = fit.faults[number], fit.coefficients(number)
+    covariance = fit.covariance[mine, mine] * inflation
+    known_to = np.array([p.known_to for p in one.parameters])
+    spread = np.hypot(known_to, SCALE_ERROR * one.values * one.is_free)
+    none = np.zeros(len(one.values))
+    steps = rng.multivariate_normal(none, covariance, DRAWS, check_valid="ignore")
     noise = spread * rng.standard_normal(steps.shape)
-    drawn = [
-        one.with_values(session, one.values + step * typical + more).alike(session)
-        for step, more in zip(steps, noise, strict=True)
-    ]
-    alike = [each[rng.integers(len(each))].reported(session) for each in drawn]
-    return numbers_of(one.alike(session)[0].reported(session), alike)
+    drawn = [one.with_values(x).alike() for x in one.values + steps * one.typical + noise]
+    alike = [each[rng.integers(len(each))].reported() for each in drawn]
+    return numbers_of(one.alike()[0].reported(), alike)
 
 
 def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, ...]:

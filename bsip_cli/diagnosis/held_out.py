@@ -3,22 +3,17 @@ whether it is of one size throughout."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
-from bsip_cli.diagnosis.error_model import posterior
-from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
-from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
-from bsip_cli.effects.nameless import UNEXPLAINED, Nameless
-from bsip_cli.effects.scene import Scene
+from bsip_cli.diagnosis.error_model import Session, posterior, summed
+from bsip_cli.diagnosis.fault_model import Fitted, columns_of
 from bsip_cli.statistics.samples import Z95
 
 FOLDS = 5
-BLOCK_S = 1.0  # intervals of time that stand for independent ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,21 +50,8 @@ class Gain:
 
 def first_blocks(session: Session) -> list[int]:
     """Number of each trial's first block, counted through all of them."""
-    counts = [int(own_blocks(session, t).max()) + 1 for t in range(len(session.trials))]
+    counts = [int(one.blocks.max()) + 1 for one in session.trials]
     return np.cumsum([0, *counts[:-1]]).tolist()
-
-
-def start_s(session: Session, trial: int) -> float:
-    """When a trial's first block begins."""
-    one = session.trials[trial]
-    return float(one.scene.times_s[one.errors.filter.frames][0])
-
-
-def own_blocks(session: Session, trial: int) -> np.ndarray:
-    """(n,) block of each sample of a trial."""
-    one = session.trials[trial]
-    times = one.scene.times_s[one.errors.filter.frames]
-    return ((times - start_s(session, trial)) / BLOCK_S).astype(int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +73,17 @@ class HeldOut:
         kept = _linear(fit)
         kept[fit.coefficients(number)] = False
         offsets = {
-            t: fit.whitened(t, columns_of(fit.session, one, t)[1][..., None])[:, 0]
-            for t in one.trials
+            t: fit.pieces[t].noise.white(columns_of(one, t)[1][..., None])[:, 0] for t in one.trials
         }
         without = _means(fit, self.blocks, kept, offsets)
         saved: list[np.ndarray] = []
         before = 0.0
         for t in one.trials:
             piece, fold = fit.pieces[t], self.blocks[t] % FOLDS
-            at = piece.used[None, :], fold[:, None]
-            own = (x[at[1], at[0]] for x in (self.means, without))
-            full, fewer = (np.einsum("rk,rk->r", piece.white, x) for x in own)
+            own = np.ix_(fold, piece.used)
+            full, fewer = (
+                np.einsum("rk,rk->r", piece.white, x[own]) for x in (self.means, without)
+            )
             squares = (piece.right + offsets[t] - fewer) ** 2
             before += float(squares.sum())
             gone = squares - (piece.right - full) ** 2
@@ -111,10 +93,8 @@ class HeldOut:
 
 def held_out(fit: Fitted) -> HeldOut:
     """Every fifth block of all trials is left out in turn."""
-    firsts = first_blocks(fit.session)
-    blocks = tuple(
-        np.repeat(first + own_blocks(fit.session, t), 6) for t, first in enumerate(firsts)
-    )
+    trials = zip(first_blocks(fit.session), fit.session.trials, strict=True)
+    blocks = tuple(np.repeat(first + one.blocks, 6) for first, one in trials)
     return HeldOut(fit, blocks, _means(fit, blocks, _linear(fit), {}))
 
 
@@ -123,7 +103,7 @@ def _linear(fit: Fitted) -> np.ndarray:
     does, so they stay as all seconds have them."""
     kept = np.ones(len(fit.mean), dtype=bool)
     for number, one in enumerate(fit.faults):
-        kept[fit.coefficients(number)] = one.is_free(fit.session)
+        kept[fit.coefficients(number)] = one.is_free
     return kept
 
 
@@ -161,62 +141,19 @@ _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault diffe
 _STEPS, _SPREAD = np.geomspace(1.0, 3.0, 3), 0.3
 
 
-class Uneven(Nameless):
-    """Like another effect, but of another size in every interval of time."""
-
-    is_of_laboratory = False
-
-    def __init__(self, effect: Effect) -> None:
-        self.effect = effect
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return self.effect.targets(scene)
-
-    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return self.effect.parameters(scene, target)
-
-    def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:
-        return self.effect.scans(scene, target)
-
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return self.effect.change(scene, target, values)
-
-    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return self.effect.tangent(scene, target, values)
-
-    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        return self.effect.reported(scene, target, values)
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        known = self.effect.words(scene, target, values)
-        return replace(known, what=f"of unknown cause: {known.what}, but not evenly", short="")
-
-
-def plain(effect: Effect) -> Effect:
-    """What an uneven effect acts like; another one itself."""
-    return effect.effect if isinstance(effect, Uneven) else effect
-
-
-def can_be_uneven(effect: Effect) -> bool:
-    """A rail is touched now more, now less; what trials share is as it is."""
-    return effect.is_shared and effect.name != UNEXPLAINED
-
-
 def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
     """Logarithm of the Bayes factor of a size that is not the same throughout, against one size:
     it differs from block to block, or is there from a block of a trial on, or until then.
 
     inflation (T,) : the trials' likelihoods count by so much less.
     """
-    session, one, root = fit.session, fit.faults[number], fit.root_of_covariance
+    one, root = fit.faults[number], fit.root_of_covariance
     pulls, grams, shared = [], [], []
-    for t in one.trials:
-        trial, piece = session.trials[t], fit.pieces[t]
-        change = trial.errors.filter.one(one.effect.change(trial.simulated, one.target, one.values))
-        block = own_blocks(session, t)
+    for t, trial in zip(one.trials, one.in_trials, strict=True):
+        piece, block = fit.pieces[t], trial.blocks
         mine = block[:, None, None] == np.arange(block.max() + 1)
-        white = fit.whitened(t, np.where(mine, change[..., None], 0.0))
-        pulls.append(white.T @ fit.left(t) / inflation[t])
+        white = piece.noise.white(np.where(mine, one.filtered_change(trial)[..., None], 0.0))
+        pulls.append(white.T @ piece.left(fit.mean) / inflation[t])
         grams.append(white.T @ white / inflation[t])
         shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)

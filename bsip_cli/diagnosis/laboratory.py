@@ -63,6 +63,11 @@ class Persons:
     moments_s: tuple[float, float]
 
     @property
+    def moving(self) -> tuple[Coordinate, ...]:
+        """Those of motion, which are the numbers."""
+        return self.coordinates[: len(self.groups)]
+
+    @property
     def both(self) -> np.ndarray:
         """(C, K) what makes coordinates of the numbers."""
         return np.eye(len(self.groups))[self.numbers]
@@ -213,10 +218,16 @@ class Offset:
         before = _log_within(np.zeros_like(mean), sizes[:, None], most).sum(axis=1)
         return np.asarray(0.5 * gains.sum(axis=1) + after - before)
 
-    def of_size(self, size: float) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (k,) and covariance (k, k) if they are there."""
-        covariance = np.linalg.inv(self.precision + np.eye(len(self.pull)) / size**2)
-        return covariance @ self.pull, covariance
+    @property
+    def covariance(self) -> np.ndarray:
+        """(k, k) if they are there."""
+        return np.linalg.inv(self.precision + np.eye(len(self.pull)) / SIZES[1] ** 2)
+
+    def drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """(count, k) of them, if they are there."""
+        covariance = self.covariance
+        mean = covariance @ self.pull
+        return rng.multivariate_normal(mean, covariance, count, check_valid="ignore")
 
 
 def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
@@ -259,8 +270,7 @@ def posterior_of(sums: Sums, root: np.ndarray) -> Posterior:
 
 def anything(persons: Persons, scale: np.ndarray) -> np.ndarray:
     """(C, K + S) root of the covariance if every fault may be there, and large."""
-    moving = persons.coordinates[: len(persons.groups)]
-    is_mass = [one.effect == STATED_MASS.name for one in moving]
+    is_mass = [one.effect == STATED_MASS.name for one in persons.moving]
     sizes = np.where(is_mass, persons.ordinary, SIZES[1])
     return np.hstack([persons.both * sizes, persons.differences(scale)])
 
@@ -323,7 +333,7 @@ def _growing_lag(persons: Persons) -> np.ndarray:
     """(C,) a delay that is no delay in the mean, but early and late in a recording as different as
     persons are: soft tissue lags, and clocks whose rates differ do as much."""
     lag = np.zeros(len(persons.coordinates))
-    at = {one.effect: k for k, one in enumerate(persons.coordinates[: len(persons.groups)])}
+    at = {one.effect: k for k, one in enumerate(persons.moving)}
     if {SyncOffset.name, ClockDrift.name} <= at.keys():
         delay, rate = at[SyncOffset.name], at[ClockDrift.name]
         mean_s, sd_s = persons.moments_s

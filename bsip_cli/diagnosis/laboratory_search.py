@@ -12,11 +12,9 @@ from string import ascii_uppercase
 import numpy as np
 from scipy.special import expit, logit, logsumexp
 
-from bsip_cli.diagnosis.fault_model import SIZES
-from bsip_cli.diagnosis.fault_scores import named_size
+from bsip_cli.diagnosis.fault_scores import BEFORE, named_size
 from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
-    Offset,
     Persons,
     Pooled,
     Posterior,
@@ -32,10 +30,11 @@ from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, STATED_MASS, Coord
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation, PlateZero
 
-BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
 _TIMES = np.geomspace(0.3, 3.0, 5)  # deviations so many times as large as is likeliest
 _MOST = 8  # faults of a laboratory
 _DRAWS = 4000
+_JUDGED = 10  # sessions that are judged with scales of their own
+_RANKS = ("named", "ambiguous", "rejected", "inconclusive")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +50,12 @@ class Cause:
     def most(self) -> np.ndarray:
         """(k,) no number is larger [typical]."""
         return np.array([one.most / one.typical for one in self.parameters])
+
+    def evidence(self, posterior: Posterior, sums: Sums) -> tuple[float, float]:
+        """Logarithm of the Bayes factor that some persons have it on top of what is known, and its
+        likeliest size before the data [typical]."""
+        logs = posterior.offset(sums, self.directions).log_factors(BEFORE, self.most)
+        return float(logsumexp(logs) - np.log(len(BEFORE))), float(BEFORE[int(np.argmax(logs))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,9 @@ class Verdict:
 
     said : named; ambiguous: it is one of those of its ``class_id``, which cannot be distinguished;
     rejected; or inconclusive: even ten times what laboratories meet would not have been named.
-    probability : that it is there, and not another one in its place.
+    probability : that it is there, and not another one in its place. sessions : that have it on top
+    of what their laboratory has, by their numbers among its own, one or all from one on; none of a
+    cause that is the laboratory's.
     """
 
     cause: Cause
@@ -79,6 +86,7 @@ class Verdict:
     class_id: str
     probability: float
     sizes: tuple[Size, ...]
+    sessions: tuple[int, ...] = ()
 
 
 def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Cause, ...]:
@@ -88,7 +96,7 @@ def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Ca
     """
     found = []
     for effect in OF_A_LABORATORY:
-        mine = [one.target for one in _moving(persons) if one.effect == effect.name]
+        mine = [one.target for one in persons.moving if one.effect == effect.name]
         alike: dict[str, list[str]] = {}
         for target in dict.fromkeys(mine):
             found.append(_cause(persons, effect.name, target, [target], centres_m))
@@ -101,10 +109,6 @@ def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Ca
     return tuple(found)
 
 
-def _moving(persons: Persons) -> Sequence[Coordinate]:
-    return persons.coordinates[: len(persons.groups)]
-
-
 def _cause(
     persons: Persons,
     effect: str,
@@ -112,24 +116,21 @@ def _cause(
     parts: Sequence[str],
     centres_m: Mapping[str, np.ndarray],
 ) -> Cause:
-    known = dict(zip(_moving(persons), persons.parameters, strict=False))
+    """At some parts alike; what turns them about their middle shifts each of them too."""
+    known = dict(zip(persons.moving, persons.parameters, strict=False))
     at = {one: k for k, one in enumerate(known)}
     mine = [p for one, p in known.items() if (one.effect, one.target) == (effect, parts[0])]
     directions = np.zeros((len(at), len(mine)))
     for part, (k, parameter) in product(parts, enumerate(mine)):
         directions[at[Coordinate(effect, part, parameter.name)], k] = 1.0
-    if effect == PlateRotation.name and len(parts) > 1:
-        middle = np.mean([centres_m[part] for part in parts], axis=0)
-        turns = {f"{word}": axis for word, axis in zip(_TURNS, np.eye(3), strict=True)}
-        for part, (k, parameter) in product(parts, enumerate(mine)):
+        if effect == PlateRotation.name and len(parts) > 1:
+            turns = dict(zip(("tilt_x", "tilt_y", "yaw"), np.eye(3), strict=True))
+            middle = np.mean([centres_m[one] for one in parts], axis=0)
             shift_m = np.cross(turns[parameter.name], centres_m[part] - middle)
             for axis, metres in zip("xyz", parameter.typical * shift_m, strict=True):
                 moved = Coordinate(PlateTranslation.name, part, axis)
                 directions[at[moved], k] = metres / known[moved].typical
     return Cause(effect, target, tuple(mine), persons.both @ directions)
-
-
-_TURNS = ("tilt_x", "tilt_y", "yaw")
 
 
 def log_prior_of(causes: Sequence[Cause], prior_odds: float) -> np.ndarray:
@@ -165,9 +166,17 @@ class Laboratory:
         return np.column_stack([ordinary, differences, self.alike, *there])
 
     def sizes(self, k: int, named_from: float, rng: np.random.Generator) -> tuple[Size, ...]:
-        """Of a cause, if it is there."""
-        needed = needed_of(self.log_prior[k], named_from)
-        return sizes_of(_drawn(self, k, rng), self.causes[k].parameters, needed, rng)
+        """Of a cause, if it is there: from the posterior over how large the persons' deviations may
+        be, which few persons do not determine."""
+        cause, persons = self.causes[k], self.persons
+        touched = persons.groups[persons.numbers[cause.directions.any(axis=1)]]
+        others = self.with_other_scales(frozenset(touched.tolist()))
+        logs = np.array([log for _, log in others])
+        shares = np.exp(logs - logsumexp(logs))
+        counts = rng.multinomial(_DRAWS, shares / shares.sum())
+        offsets = [self.posterior(k, sums).offset(sums, cause.directions) for sums, _ in others]
+        drawn = [x.drawn(int(n), rng) for x, n in zip(offsets, counts, strict=True)]
+        return sizes_of(np.concatenate(drawn), cause, self.log_prior[k], named_from, rng)
 
     def with_other_scales(self, groups: frozenset[int]) -> list[tuple[Sums, float]]:
         """Sums with the deviations of some groups so many times as large, and the logarithm of the
@@ -178,8 +187,7 @@ class Laboratory:
             for times in _TIMES:
                 scale = np.where(touched, times * self.scale, self.scale)
                 sums = sums_of(self.persons, scale)
-                root = anything(self.persons, scale)
-                log = posterior_of(sums, root).log_evidence
+                log = posterior_of(sums, anything(self.persons, scale)).log_evidence
                 self._kept[groups].append((sums, log + log_prior_of_scales(scale)))
         return self._kept[groups]
 
@@ -196,7 +204,8 @@ class Laboratory:
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
-    """Fit the deviations jointly with any fault, and then look for what is there."""
+    """Fit the deviations jointly with any fault, look for what is there, and judge each fault given
+    the others: one that is likelier absent goes, the least likely first."""
     scale = scales_of(persons)
     log_prior = log_prior_of(causes, prior_odds)
     sums = sums_of(persons, scale)
@@ -207,24 +216,6 @@ def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float
         if best is None or odds[best][0] < 0:
             break
         lab = replace(lab, found={**lab.found, best: odds[best][1]})
-    return _without_the_unlikely(lab)
-
-
-def _log_odds(lab: Laboratory, but: int | None = None) -> dict[int, tuple[float, float]]:
-    """Of each cause that is not there: logarithm of the odds that it is too, and its likeliest size
-    before the data. ``but`` : a fault that counts as not there."""
-    posterior = lab.posterior(but)
-    found = {}
-    for k, cause in enumerate(lab.causes):
-        if k == but or k not in lab.found:
-            logs = posterior.offset(lab.sums, cause.directions).log_factors(BEFORE, cause.most)
-            log = float(logsumexp(logs)) - np.log(len(BEFORE)) + lab.log_prior[k]
-            found[k] = (log, float(BEFORE[int(np.argmax(logs))]))
-    return found
-
-
-def _without_the_unlikely(lab: Laboratory) -> Laboratory:
-    """Each fault given the others; one that is likelier absent goes, the least likely first."""
     while lab.found:
         odds = {k: _log_odds(lab, but=k)[k] for k in lab.found}
         lab = replace(lab, found={k: size for k, (_, size) in odds.items()})
@@ -235,6 +226,18 @@ def _without_the_unlikely(lab: Laboratory) -> Laboratory:
     return lab
 
 
+def _log_odds(lab: Laboratory, but: int | None = None) -> dict[int, tuple[float, float]]:
+    """Of each cause that is not there: logarithm of the odds that it is too, and its likeliest size
+    before the data. ``but`` : a fault that counts as not there."""
+    posterior = lab.posterior(but)
+    found = {}
+    for k, cause in enumerate(lab.causes):
+        if k == but or k not in lab.found:
+            log, size = cause.evidence(posterior, lab.sums)
+            found[k] = (log + float(lab.log_prior[k]), size)
+    return found
+
+
 def verdicts_of(
     lab: Laboratory, named_from: float, rng: np.random.Generator
 ) -> tuple[Verdict, ...]:
@@ -242,7 +245,9 @@ def verdicts_of(
     said: dict[int, tuple[str, str, float]] = {}
     letters = iter(ascii_uppercase)
     for k in lab.found:
-        shares = _shares(lab, k)
+        odds = _log_odds(lab, but=k)
+        each = shares_of(np.array([log for log, _ in odds.values()]))
+        shares = dict(zip(odds, each.tolist(), strict=True))
         if shares[k] >= named_from:
             said[k] = ("named", "", shares[k])
         elif sum(shares.values()) >= named_from:
@@ -254,18 +259,20 @@ def verdicts_of(
     rest = _log_odds(lab)
     for k in range(len(lab.causes)):
         said.setdefault(k, ("rejected", "", float(expit(rest[k][0])) if k in rest else 0.0))
-    order = sorted(said, key=lambda k: (_RANKS.index(said[k][0]), said[k][1], -said[k][2]))
-    return tuple(_verdict(lab, k, *said[k], named_from, rng) for k in order)
+    found = []
+    for k in sorted(said, key=lambda k: (_RANKS.index(said[k][0]), said[k][1], -said[k][2])):
+        what, class_id, probability = said[k]
+        sizes = lab.sizes(k, named_from, rng)
+        if what == "rejected" and all(np.isinf(one.limit) for one in sizes):
+            what = "inconclusive"
+        found.append(Verdict(lab.causes[k], what, class_id, probability, sizes))
+    return tuple(found)
 
 
-_RANKS = ("named", "ambiguous", "rejected")
-
-
-def _shares(lab: Laboratory, number: int) -> dict[int, float]:
-    """Probabilities that a fault, or another one in its place, is there given the others."""
-    logs = {k: log for k, (log, _) in _log_odds(lab, but=number).items()}
-    total = logsumexp([0.0, *logs.values()])
-    return {k: float(np.exp(log - total)) for k, log in logs.items()}
+def shares_of(logs: np.ndarray) -> np.ndarray:
+    """(K,) probability that each of some causes is there, one of them or none; ``logs`` : of the
+    odds of each against none."""
+    return np.exp(logs - logsumexp([0.0, *logs]))
 
 
 def smallest(shares: Mapping[int, float], least: float) -> Iterator[int]:
@@ -278,53 +285,13 @@ def smallest(shares: Mapping[int, float], least: float) -> Iterator[int]:
             return
 
 
-def _verdict(
-    lab: Laboratory,
-    k: int,
-    said: str,
-    class_id: str,
-    probability: float,
-    named_from: float,
-    rng: np.random.Generator,
-) -> Verdict:
-    sizes = lab.sizes(k, named_from, rng)
-    if said == "rejected" and all(np.isinf(one.limit) for one in sizes):
-        said = "inconclusive"
-    return Verdict(lab.causes[k], said, class_id, probability, sizes)
-
-
-def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
-    """(D, k) sizes [typical] of a cause from the posterior if it is there, over how large the
-    persons' deviations may be: few persons do not determine it."""
-    cause = lab.causes[k]
-    touched = lab.persons.groups[lab.persons.numbers[cause.directions.any(axis=1)]]
-    offsets, logs = [], []
-    for sums, log in lab.with_other_scales(frozenset(touched.tolist())):
-        logs.append(log)
-        offsets.append(lab.posterior(k, sums).offset(sums, cause.directions))
-    shares = np.exp(np.array(logs) - logsumexp(logs))
-    counts = rng.multinomial(_DRAWS, shares / shares.sum())
-    return np.concatenate(
-        [_drawn_from(one, n, rng) for one, n in zip(offsets, counts, strict=True)]
-    )
-
-
-def _drawn_from(one: Offset, count: int, rng: np.random.Generator) -> np.ndarray:
-    mean, covariance = one.of_size(SIZES[1])
-    return rng.multivariate_normal(mean, covariance, count, check_valid="ignore")
-
-
-def needed_of(log_prior: float, named_from: float) -> float:
-    """Logarithm of the Bayes factor that names a cause."""
-    return float(logit(named_from) - log_prior)
-
-
 def sizes_of(
-    drawn: np.ndarray, parameters: Sequence[Parameter], needed: float, rng: np.random.Generator
+    drawn: np.ndarray, cause: Cause, log_prior: float, named_from: float, rng: np.random.Generator
 ) -> tuple[Size, ...]:
-    """From draws (D, k) [typical]; needed : logarithm of the Bayes factor that names it."""
+    """Of a cause, from draws (D, k) [typical] if it is there."""
+    needed = float(logit(named_from) - log_prior)  # logarithm of the Bayes factor that names it
     found = []
-    for x, parameter in zip(drawn.T, parameters, strict=True):
+    for x, parameter in zip(drawn.T, cause.parameters, strict=True):
         value = float(x.mean())
         spread = np.hypot(parameter.known_to / parameter.typical, SCALE_ERROR * value)
         low, high = np.percentile(x + spread * rng.standard_normal(len(x)), [2.5, 97.5])
@@ -335,26 +302,7 @@ def sizes_of(
     return tuple(found)
 
 
-# --- persons and sessions that deviate from their laboratory, and dates from which on it changed
-
-
-_JUDGED = 10  # sessions that are judged with scales of their own
-
-
-@dataclass(frozen=True, eq=False)
-class Deviation:
-    """A cause that some sessions have on top of what their laboratory has.
-
-    sessions : their numbers among the laboratory's; one, or all from one on. class_id : of causes
-    that cannot be distinguished; empty for one alone.
-    """
-
-    sessions: tuple[int, ...]
-    cause: Cause
-    said: str
-    class_id: str
-    probability: float
-    sizes: tuple[Size, ...]
+# --- persons and sessions that deviate from their laboratory, and dates from which on it changed --
 
 
 def deviations_of(
@@ -363,7 +311,7 @@ def deviations_of(
     named_from: float,
     order: Sequence[int],
     rng: np.random.Generator,
-) -> tuple[Deviation, ...]:
+) -> tuple[Verdict, ...]:
     """Each session judged by all others, at one prior odds for all sessions together.
 
     order : numbers of the sessions whose dates are known, the earliest first: of these a lasting
@@ -371,40 +319,32 @@ def deviations_of(
     """
     persons = lab.persons
     count = len(persons.pull)
-    causes = (*lab.causes, *_stated_mass(lab))
+    mass = Coordinate(STATED_MASS.name, "", STATED_MASS.parameter.name)
+    directions = np.array([[float(one == mass)] for one in persons.coordinates])
+    causes = (*lab.causes, Cause(STATED_MASS.name, "", (STATED_MASS.parameter,), directions))
     log_prior = log_prior_of(causes, prior_odds) - np.log(count + max(0, len(order) - 2))
-    found: list[Deviation] = []
-    alone = _likeliest(lab, causes, _each(lab) if count > 1 else ())
-    since = _likeliest(lab, causes, _from_each_on(lab, order))
-    likeliest = [(k,) for k in alone] + [tuple(order[k:]) for k in since]
-    for sessions in likeliest:
-        total, own = _by_the_others(lab, sessions)
-        posterior = lab.posterior(sums=total)
-        offsets = [posterior.offset(own, one.directions) for one in causes]
-        logs = _log_odds_of(offsets, causes) + log_prior
-        there = float(np.exp(logsumexp(logs) - np.logaddexp(0.0, logsumexp(logs))))
-        if there < named_from:
+    each = ((k, sums_of(persons, lab.scale, (k,))) for k in range(count if count > 1 else 0))
+    alone = [(k,) for k in _likeliest(lab, causes, each)]
+    lasting = [tuple(order[k:]) for k in _likeliest(lab, causes, _from_each_on(lab, order))]
+    found: list[Verdict] = []
+    for sessions in (*alone, *lasting):
+        # with the scales of deviations from the others' laboratory and from their own
+        others = np.setdiff1d(np.arange(count), sessions)
+        parts = (others, sessions) if len(sessions) > 1 else (others,)
+        scale = scales_of(persons, *parts, start=lab.scale)
+        own = sums_of(persons, scale, sessions)
+        posterior = lab.posterior(sums=sums_of(persons, scale, others).with_(own))
+        logs = np.array([one.evidence(posterior, own)[0] for one in causes]) + log_prior
+        shares = dict(enumerate(shares_of(logs).tolist()))
+        if sum(shares.values()) < named_from:
             continue
-        shares = dict(enumerate(np.exp(logs - np.logaddexp(0.0, logsumexp(logs))).tolist()))
         members = list(smallest(shares, named_from))
+        said = ("named", "") if len(members) == 1 else ("ambiguous", f"{sessions[0] + 1}")
         for k in members:
-            sizes = _sizes(offsets[k], causes[k], needed_of(log_prior[k], named_from), rng)
-            said = "named" if len(members) == 1 else "ambiguous"
-            class_id = "" if len(members) == 1 else f"{sessions[0] + 1}"
-            found.append(Deviation(sessions, causes[k], said, class_id, shares[k], sizes))
+            drawn = posterior.offset(own, causes[k].directions).drawn(_DRAWS, rng)
+            sizes = sizes_of(drawn, causes[k], log_prior[k], named_from, rng)
+            found.append(Verdict(causes[k], *said, shares[k], sizes, sessions))
     return tuple(found)
-
-
-def _stated_mass(lab: Laboratory) -> Iterator[Cause]:
-    coordinates = lab.persons.coordinates
-    mine = Coordinate(STATED_MASS.name, "", STATED_MASS.parameter.name)
-    directions = np.array([[float(one == mine)] for one in coordinates])
-    yield Cause(STATED_MASS.name, "", (STATED_MASS.parameter,), directions)
-
-
-def _each(lab: Laboratory) -> Iterator[tuple[int, Sums]]:
-    for k in range(len(lab.persons.pull)):
-        yield k, sums_of(lab.persons, lab.scale, (k,))
 
 
 def _from_each_on(lab: Laboratory, order: Sequence[int]) -> Iterator[tuple[int, Sums]]:
@@ -423,33 +363,5 @@ def _likeliest(
     """The sets of sessions that deviate most, with the scales of all: only of these the scales
     jointly with their deviation are fitted, which among many sessions are the same."""
     posterior = lab.posterior()
-    odds = {}
-    for k, own in asked:
-        offsets = [posterior.offset(own, one.directions) for one in causes]
-        odds[k] = _log_odds_of(offsets, causes).max()
+    odds = {k: max(one.evidence(posterior, own)[0] for one in causes) for k, own in asked}
     return sorted(sorted(odds, key=lambda k: odds[k])[-_JUDGED:])
-
-
-def _by_the_others(lab: Laboratory, sessions: tuple[int, ...]) -> tuple[Sums, Sums]:
-    """What all show and what some sessions show, with the scales of deviations from the others'
-    laboratory and from their own."""
-    persons = lab.persons
-    others = np.setdiff1d(np.arange(len(persons.pull)), sessions)
-    parts = (others, sessions) if len(sessions) > 1 else (others,)
-    scale = scales_of(persons, *parts, start=lab.scale)
-    own = sums_of(persons, scale, sessions)
-    return sums_of(persons, scale, others).with_(own), own
-
-
-def _log_odds_of(offsets: Sequence[Offset], causes: Sequence[Cause]) -> np.ndarray:
-    pairs = zip(offsets, causes, strict=True)
-    logs = np.array([logsumexp(one.log_factors(BEFORE, cause.most)) for one, cause in pairs])
-    return logs - np.log(len(BEFORE))
-
-
-def _sizes(
-    offset: Offset, cause: Cause, needed: float, rng: np.random.Generator
-) -> tuple[Size, ...]:
-    mean, covariance = offset.of_size(SIZES[1])
-    drawn = rng.multivariate_normal(mean, covariance, _DRAWS, check_valid="ignore")
-    return sizes_of(drawn, cause.parameters, needed, rng)

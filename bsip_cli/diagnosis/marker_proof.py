@@ -15,17 +15,12 @@ import numpy as np
 from scipy.special import logit
 from scipy.stats import chi2
 
+from bsip_cli.diagnosis.error_model import BLOCK_S, Session
+from bsip_cli.diagnosis.fault_scores import Candidate
 from bsip_cli.diagnosis.filtering import every
-from bsip_cli.diagnosis.findings import (
-    DRAWS,
-    SCALE_ERROR,
-    Finding,
-    interval_words,
-    numbers_of,
-    scope_of,
-)
-from bsip_cli.diagnosis.held_out import BLOCK_S, Gain
-from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
+from bsip_cli.diagnosis.findings import DRAWS, SCALE_ERROR, Finding, interval_words, numbers_of
+from bsip_cli.diagnosis.held_out import Gain
+from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, Number, Words
 from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
@@ -67,9 +62,9 @@ class Proof:
     share: float
     p_value: float
 
-    def hypothesis(self, trial: int) -> Hypothesis:
+    def hypothesis(self, session: Session, trial: int) -> Hypothesis:
         """As the search for faults takes it."""
-        return Hypothesis(self.effect, self.target, (trial,), self.values)
+        return Hypothesis(self.effect, self.target, (trial,), self.values, session)
 
     def finding(self, scene: Scene, trial: str, gain: Gain | None) -> Finding:
         """As the diagnosis prints it. gain : of the forces."""
@@ -79,7 +74,7 @@ class Proof:
         )
         numbers = numbers_of(reported, drawn)
         remark = f"; this is {100 * self.share:.0f} % of {whose} squared residual"
-        more: dict[str, Any] = {"scope": scope_of(self.effect)}
+        more: dict[str, Any] = {"scope": self.effect.scope}
         if gain is not None and gain.is_real():
             more["gain"] = gain.interval()
         else:
@@ -231,12 +226,17 @@ def _sized(
     laid on each frame that all frames together say no more, and the sizes have their typical
     spread before the data.
     """
-    candidate = Candidate(effect, target, scanned)
-    parameters = candidate.free(scene)
-    typical = np.array([p.typical for p in parameters])
-    shapes = [
-        _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
-    ]
+    null, free = Candidate(effect, target, scanned).null(scene), effect.is_free(scene, target)
+    parameters = effect.parameters(scene, target)
+    typical, known_to = np.array([(p.typical, p.known_to) for p in parameters]).T
+
+    def values(sizes: np.ndarray) -> np.ndarray:
+        """(K,) of free parameters [typical]."""
+        whole = null.copy()
+        whole[free] = typical[free] * sizes
+        return whole
+
+    shapes = [_left(effect, scene, target, values(one)) for one in np.eye(int(free.sum()))]
     shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
     throughout = bool(scanned) and _is_throughout(scene, scanned[0])
     columns, observed, block = _in_rows(scene, shown, residual_m, with_means=throughout)
@@ -246,24 +246,18 @@ def _sized(
     gram, right = grams.sum(axis=0), rights.sum(axis=0)
     least = np.linalg.lstsq(gram, right, rcond=None)[0]
     noise = float(((observed - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
-    prior = noise * np.eye(len(typical))
+    prior = noise * np.eye(len(right))
     size = np.linalg.solve(gram + prior, right)
     left = observed - columns @ size
-    known_to = np.array([p.known_to / p.typical for p in parameters])
-    spread = np.hypot(known_to, SCALE_ERROR * size)
+    spread = np.hypot((known_to / typical)[free], SCALE_ERROR * size)
     misplaced = _misplaced(shown, residual_m, rng) if throughout else np.zeros((DRAWS, len(size)))
-    drawn = [
-        candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
-        for one in _bootstrap(grams, rights, prior, misplaced, rng)
-    ]
-    draws = np.array(drawn)
-    for k, parameter in enumerate(effect.parameters(scene, target)):
-        if parameter.scan:  # known as well as it can be
-            draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
-    values = candidate.values(scene, typical * size)
+    drawn = _bootstrap(grams, rights, prior, misplaced, rng)
+    draws = np.array([values(one + spread * rng.standard_normal(len(size))) for one in drawn])
+    for k in np.flatnonzero(~free):  # known as well as it can be
+        draws[:, k] += known_to[k] * rng.standard_normal(len(draws))
     share = 1 - float(left @ left) / float(observed @ observed)
     p_value = float(chi2.sf(size @ gram @ size / noise, len(size)))
-    return Proof(effect, target, values, draws, share, p_value)
+    return Proof(effect, target, values(size), draws, share, p_value)
 
 
 def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

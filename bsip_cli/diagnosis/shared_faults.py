@@ -10,16 +10,15 @@ that moved between them is no contradiction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from bsip_cli.diagnosis.error_model import TrialErrors
-from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated, is_of_instruments
-from bsip_cli.diagnosis.fault_model import FaultTrial, Fitted, fitted, session_of, summed
+from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of, summed
+from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated
+from bsip_cli.diagnosis.fault_model import fitted
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -30,12 +29,11 @@ from bsip_cli.effects.scene import Scene
 
 STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(
-    effect
-    for effect in CATALOGUE
-    if effect.is_of_laboratory and (is_of_instruments(effect) or isinstance(effect, Turned))
+    one
+    for one in CATALOGUE
+    if one.is_of_laboratory and (one.of_the_forces or isinstance(one, Turned))
 )
 _MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
-_ASKED = (*OF_A_LABORATORY, STATED_MASS)
 
 
 @dataclass(frozen=True, order=True)
@@ -63,18 +61,6 @@ class Information:
     pull: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class SharedTrial(FaultTrial):
-    """A trial whose forces all are as simulated: near the ends of what is valid the measured signal
-    bends as feet come and go beside the plates, and its slope would be taken for a delay."""
-
-    standing: bool
-
-    @cached_property
-    def simulated(self) -> Scene:
-        return as_simulated(self.scene)
-
-
 def shared_targets(effect: Effect, scene: Scene) -> list[str]:
     """Where a trial has a fault that all have."""
     return [one for one in effect.targets(scene) if effect.is_shared_at(scene, one)]
@@ -86,18 +72,53 @@ def inner(scene: Scene) -> Scene:
     return replace(scene, valid=binary_erosion(scene.valid, iterations=margin, border_value=1))
 
 
-def information_of(trials: Sequence[SharedTrial]) -> Information:
+def information_of(trials: Sequence[TrialErrors], standing: Sequence[bool]) -> Information:
     """Scales and noise are the person's own; the equations are linear about no fault.
 
     About what one person shows alone they would not be: a few steps on two plates fit any fault.
+    All forces are as simulated: near the ends of what is valid the measured signal bends as feet
+    come and go beside the plates, and its slope would be taken for a delay.
+
+    standing : in which trials the person stands still.
     """
     own = []
-    for one in trials:  # without the ordinary terms that are asked of the laboratory
-        kept = tuple(x for x in _own_terms(one.errors) if x.scale != f"{INERTIA} in all")
-        own.append(replace(one, errors=replace(one.errors, terms=kept)))
+    for trial in trials:  # without the ordinary terms that are asked of the laboratory
+        kept = tuple(x for x in _own_terms(trial) if x.scale != f"{INERTIA} in all")
+        own.append(replace(trial, terms=kept, late_as_measured=False))
     session = session_of(own)
-    moving = {k for k, one in enumerate(trials) if not one.standing}
-    return _marginal(fitted(session, _hypotheses(trials, moving)), moving)
+    fit = fitted(session, list(_hypotheses(session, standing)))
+    coordinates, parameters, counts = [], [], []
+    for one in fit.faults:
+        stands = all(standing[t] for t in one.trials)
+        for parameter in one.parameters:
+            coordinates.append(Coordinate(one.name, one.target, parameter.name, stands))
+            parameters.append(parameter)
+            counts.append(len(one.trials))
+    gram, against = summed(fit.pieces, len(fit.mean))
+    mine, shared = np.split(np.arange(len(fit.mean)), [session.count])
+    root = fit.root[mine]
+    inside = gram[np.ix_(mine, mine)] * np.outer(root, root) + np.eye(len(mine))
+    across = root[:, None] * gram[np.ix_(mine, shared)]
+    taken = np.linalg.solve(inside, np.column_stack([across, root * against[mine]]))
+    precision = gram[np.ix_(shared, shared)] - across.T @ taken[:, :-1]
+    pull = against[shared] - across.T @ taken[:, -1]
+    precision = (precision + precision.T) / 2
+    return Information(tuple(coordinates), tuple(parameters), np.array(counts), precision, pull)
+
+
+def _hypotheses(session: Session, standing: Sequence[bool]) -> Iterator[Hypothesis]:
+    """Every shared fault at every plate, in motion and in quiet stance separately; all plates
+    alike are these together."""
+    for effect in (*OF_A_LABORATORY, STATED_MASS):
+        targets = [shared_targets(effect, one.scene) for one in session.trials]
+        for target in dict.fromkeys(name for mine in targets for name in mine):
+            if target.split(" ")[0] == ALL:
+                continue
+            holding = [t for t, mine in enumerate(targets) if target in mine]
+            separate = [[t for t in holding if standing[t] == stands] for stands in (False, True)]
+            for trials in [holding] if effect is STATED_MASS else filter(None, separate):
+                count = len(effect.parameters(session.trials[trials[0]].scene, target))
+                yield Hypothesis(effect, target, tuple(trials), np.zeros(count), session)
 
 
 def _own_terms(errors: TrialErrors) -> list[Term]:
@@ -106,72 +127,28 @@ def _own_terms(errors: TrialErrors) -> list[Term]:
 
 
 def with_known(
-    trial: FaultTrial,
+    trial: TrialErrors,
     standing: bool,
     coordinates: Sequence[Coordinate],
     mean: np.ndarray,
     root: np.ndarray,
-) -> FaultTrial:
+) -> TrialErrors:
     """A trial whose shared faults are known from others, instead of as all laboratories have them.
 
     standing : whether the person stands still. mean (C,), root (C, K) : of the sizes and of the
     covariance of these [typical].
     """
-    scene, filter_ = as_simulated(trial.scene), trial.errors.filter
-    columns = np.zeros((*trial.errors.residual.shape, len(coordinates)))
+    scene = as_simulated(trial.scene)
+    columns = np.zeros((*trial.residual.shape, len(coordinates)))
     for effect in OF_A_LABORATORY:
         for target in shared_targets(effect, trial.scene):
             parameters = effect.parameters(trial.scene, target)
             mine = [Coordinate(effect.name, target, p.name, standing) for p in parameters]
             if mine[0] in coordinates:
                 at = [coordinates.index(one) for one in mine]
-                typical = np.array([one.typical for one in parameters])
-                slope = effect.tangent(scene, target, np.zeros(len(typical))) * typical
-                columns[..., at] = filter_(slope)
+                slope = effect.signature(scene, target, np.zeros(len(parameters)))
+                columns[..., at] = trial.filter(slope)
     name = f"{FAULT}laboratory"
     term = Term(name, "", name, False, columns, mixing=root)
-    residual = trial.errors.residual - columns @ mean
-    terms = (*_own_terms(trial.errors), term)
-    return replace(trial, errors=replace(trial.errors, residual=residual, terms=terms))
-
-
-def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothesis]:
-    """Every shared fault at every plate, in motion and in quiet stance separately; all plates
-    alike are these together."""
-    found = []
-    for effect in _ASKED:
-        targets = [shared_targets(effect, one.scene) for one in trials]
-        for target in dict.fromkeys(name for mine in targets for name in mine):
-            if target.split(" ")[0] == ALL:
-                continue
-            holding = tuple(t for t, mine in enumerate(targets) if target in mine)
-            count = len(effect.parameters(trials[holding[0]].scene, target))
-            separate = [
-                tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)
-            ]
-            for mine in [holding] if effect is STATED_MASS else filter(None, separate):
-                found.append(Hypothesis(effect, target, mine, np.zeros(count)))
-    return found
-
-
-def _marginal(fit: Fitted, moving: Set[int]) -> Information:
-    numbers = [
-        (
-            Coordinate(one.effect.name, one.target, parameter.name, not moving & {*one.trials}),
-            parameter,
-            len(one.trials),
-        )
-        for one in fit.faults
-        for parameter in one.parameters(fit.session)
-    ]
-    coordinates, parameters, trials = zip(*numbers, strict=True)
-    gram, against = summed(fit.pieces, len(fit.mean))
-    own, shared = np.split(np.arange(len(fit.mean)), [fit.session.count])
-    root = fit.root[own]
-    inner = gram[np.ix_(own, own)] * np.outer(root, root) + np.eye(len(own))
-    across = root[:, None] * gram[np.ix_(own, shared)]
-    taken = np.linalg.solve(inner, np.column_stack([across, root * against[own]]))
-    precision = gram[np.ix_(shared, shared)] - across.T @ taken[:, :-1]
-    pull = against[shared] - across.T @ taken[:, -1]
-    precision = (precision + precision.T) / 2
-    return Information(coordinates, parameters, np.array(trials), precision, pull)
+    residual = trial.residual - columns @ mean
+    return replace(trial, residual=residual, terms=(*_own_terms(trial), term))

@@ -17,8 +17,9 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.diagnosis.error_model import BLOCK_S
 from bsip_cli.diagnosis.findings import Finding
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
+from bsip_cli.diagnosis.held_out import FOLDS, Gain
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.loads import AddedMass, UnmeasuredContact
 from bsip_cli.effects.plates import PlateGain, PlateZero
@@ -119,7 +120,10 @@ def held_by(
     counts = np.array([effective_samples(signal) for signal in missing_N.T])
     error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated signals
     force = missing_N.mean(axis=0)
-    if not still or not _is_unbalanced(force, error, weight_N):
+    aside, its_error = (float(np.linalg.norm(x[:2])) for x in (force, error))
+    pushed = aside > UNBALANCED * weight_N and aside > SURE * its_error
+    lighter = force[2] > LIGHTER * weight_N and force[2] > SURE * error[2]
+    if not still or not (pushed or lighter):
         return None
     return Support(
         still,
@@ -136,14 +140,6 @@ def held_by(
 def _moves_m(path_m: np.ndarray) -> float:
     """Root mean square distance from the mean place."""
     return float(np.sqrt(((path_m - path_m.mean(axis=0)) ** 2).sum(axis=1).mean()))
-
-
-def _is_unbalanced(force: np.ndarray, error: np.ndarray, weight_N: float) -> bool:
-    aside = float(np.linalg.norm(force[:2]))
-    aside_error = float(np.linalg.norm(error[:2]))
-    pushed = aside > UNBALANCED * weight_N and aside > SURE * aside_error
-    lighter = bool(force[2] > LIGHTER * weight_N and force[2] > SURE * error[2])
-    return pushed or lighter
 
 
 def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:

@@ -79,12 +79,13 @@ class SegmentInertia(Effect):
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The part of the squared error of wrench and centre of pressure that it takes away."""
-        measured, before = scene.measured, scene.predicted
-        after = before + self.change(scene, target, values)
-        wrench = _share(measured, before, after, scene.valid)
-        seen, was, now = (_cop(scene, one) for one in (measured, before, after))
-        cop = _share(seen, was, now, scene.valid)
-        return (("share", "1", wrench), ("cop_share", "1", cop))
+        heights = [plate.centre_m()[2] for plate in scene.plates]
+        height = float(np.mean(heights)) if heights else 0.0  # of the plates' surface
+        after = scene.predicted + self.change(scene, target, values)
+        wrenches = (scene.measured, scene.predicted, after)
+        seen, was, now = (centre_of_pressure(one, height, LEAST_FORCE_N) for one in wrenches)
+        share, cop_share = _share(*wrenches, scene.valid), _share(seen, was, now, scene.valid)
+        return (("share", "1", share), ("cop_share", "1", cop_share))
 
     def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         short = f"the {in_words(target)} has other inertial parameters than simulated with"
@@ -125,12 +126,6 @@ def _share(measured: np.ndarray, before: np.ndarray, after: np.ndarray, valid: n
         return float("nan")
     was, now = (((measured - x)[known] ** 2).mean(axis=0) for x in (before, after))
     return float(1 - np.mean(now / np.maximum(was, 1e-12)))
-
-
-def _cop(scene: Scene, wrench: np.ndarray) -> np.ndarray:
-    """(N, 2) centre of pressure on the plates' surface [m]."""
-    heights = [plate.centre_m()[2] for plate in scene.plates]
-    return centre_of_pressure(wrench, float(np.mean(heights)) if heights else 0.0, LEAST_FORCE_N)
 
 
 # --- soft tissue and breath -----------------------------------------------------------------------

@@ -62,7 +62,8 @@ class Words:
 class Effect(ABC):
     """A cause outside the inertial parameters that changes wrench or markers.
 
-    All parameters without a scan vanish together: then there is no effect.
+    All parameters without a scan vanish together: then there is no effect. One defines ``change``
+    or, if that is linear in these parameters, ``tangent``.
     """
 
     name: ClassVar[str]
@@ -71,7 +72,8 @@ class Effect(ABC):
     is_of_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
-    of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
+    of_the_forces: ClassVar[bool] = False  # what is measured is wrong, and can be corrected
+    of_the_plates: ClassVar[bool] = False  # so that the truth is what was measured, less the change
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
     looks: ClassVar[str]  # what a person sees of it in the curves
     remedy: ClassVar[str]  # what would separate it from others of its ambiguity group
@@ -81,6 +83,13 @@ class Effect(ABC):
     def is_shared(self) -> bool:
         """Whether trials can share it, with the same numbers."""
         return self.is_of_laboratory or self.is_of_person
+
+    @property
+    def scope(self) -> str:
+        """How far it reaches, if it is there."""
+        if self.is_of_laboratory:
+            return "laboratory"
+        return "person" if self.is_of_person else "trial"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""
@@ -102,9 +111,9 @@ class Effect(ABC):
         """(s,) how far around scanned values a finer search looks; by default typical sizes."""
         return np.array([p.typical for p in self.parameters(scene, target) if p.scan])
 
-    @abstractmethod
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
+        return self.tangent(scene, target, values) @ values[self.is_free(scene, target)]
 
     @abstractmethod
     def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
@@ -169,6 +178,12 @@ class Effect(ABC):
             ahead = self.change(scene, target, values + step)
             columns.append((ahead - self.change(scene, target, values - step)) / (2 * step[k]))
         return np.stack(columns, axis=-1)
+
+    def signature(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(N, 6, k) the same for typical sizes."""
+        parameters = self.parameters(scene, target)
+        sizes = np.array([p.typical for p in parameters if not p.scan])
+        return self.tangent(scene, target, values) * sizes
 
 
 def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:

@@ -263,9 +263,6 @@ class Implement(Effect):
         """The shape is not sought: the plates do not show it."""
         return super().spacing(scene, target, values) * [1.0, 1.0, 1.0, 0.0]
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return self.tangent(scene, target, values)[..., 0] * values[0]
-
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The change is linear in the moment."""
         centre, shape = centre_m(values), values[4]
@@ -364,9 +361,6 @@ class ExternalForce(Effect):
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return scene.bodies
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return missing_wrenches(scene, target) @ values
-
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The change is linear in the force."""
         return missing_wrenches(scene, target)
@@ -433,9 +427,6 @@ class UnmeasuredContact(Effect):
     def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The true window may be half as long again on either side."""
         return np.array([values[4] / 2, values[4]])
-
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return self.tangent(scene, target, values) @ values[:3]
 
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The change is linear in the force."""

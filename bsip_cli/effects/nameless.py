@@ -170,9 +170,6 @@ class Course(Nameless):
         ]
         return np.stack(columns, axis=-1)
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return np.asarray(self.tangent(scene, target, values) @ values)
-
     def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         _, quantity = target.split(" by ")
         errors, along = _in_words(self.sizes(scene, target, values)), ALONG[quantity]

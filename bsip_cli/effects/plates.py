@@ -7,7 +7,6 @@ stands reads a positive fz, and an offset of +10 N in fz makes everybody seem 1 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from itertools import permutations
 from types import MappingProxyType
 
@@ -91,6 +90,7 @@ class OfPlates(Effect):
 
     is_of_laboratory = True
     of_the_plates = True
+    of_the_forces = True
     channels: tuple[str, ...] = ()
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
@@ -306,10 +306,8 @@ class PlateTranslation(OfPlates):
         return Words(f"{short} (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})", short)
 
 
-# --- clocks of cameras and plates that do not agree; and what several effects change together -----
+# --- clocks of cameras and plates that do not agree -----------------------------------------------
 
-
-Sized = tuple[Effect, str, np.ndarray]  # effect, target, values
 KNOWN_TO_S = 0.0002  # filters of plates and cameras delay a little too
 # Quartz keeps 100 ppm and 59.94 for 60 Hz is 1,000: clocks further apart are not two clocks.
 MOST_DRIFT = 0.003
@@ -319,6 +317,7 @@ class Delay(Effect):
     """The forces come late against the markers."""
 
     is_of_laboratory = True
+    of_the_forces = True
 
     @abstractmethod
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
@@ -403,32 +402,3 @@ def corrected(scene: Scene, late_s: np.ndarray) -> np.ndarray:
 def right_times_s(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     """(N,) when the forces that belong to each frame were recorded, inside the trial."""
     return np.clip(scene.times_s + late_s, scene.times_s[0], scene.times_s[-1])
-
-
-def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
-    """(N, 6) what they add to the simulated wrench, about the world's origin [N, N m].
-
-    Their changes add up, but for delays. Several are one delay: two opposite ones that were added
-    would sharpen the forces, and so make up for what a smoothed motion lacks. And what the plates
-    do wrong comes as late as their forces do.
-    """
-    from scipy.interpolate import CubicSpline  # heavy
-
-    effects = tuple(effects)
-    late_s = joint_delay_s(scene, effects)
-    of_the_plates, others = np.zeros((2, len(scene.times_s), 6))
-    for effect, target, values in effects:
-        if not isinstance(effect, Delay):
-            mine = of_the_plates if effect.of_the_plates else others
-            mine += effect.change(scene, target, values)
-    if not late_s.any():
-        return of_the_plates + others
-    if of_the_plates.any():
-        of_the_plates = CubicSpline(scene.times_s, of_the_plates)(right_times_s(scene, late_s))
-    return of_the_plates + others + corrected(scene, late_s)
-
-
-def joint_delay_s(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
-    """(N,) how late the forces of each frame were recorded, by all delays among the effects [s]."""
-    delays = (one.late_s(scene, values) for one, _, values in effects if isinstance(one, Delay))
-    return sum(delays, np.zeros(len(scene.times_s)))

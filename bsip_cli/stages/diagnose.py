@@ -13,8 +13,7 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.error_budget import Line, Yardsticks, budget_of, large_errors
-from bsip_cli.diagnosis.error_model import error_model
-from bsip_cli.diagnosis.fault_model import session_of
+from bsip_cli.diagnosis.error_model import error_model, session_of
 from bsip_cli.diagnosis.fault_scores import Library, library_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
@@ -68,7 +67,7 @@ def run(unit: Unit) -> None:
             if held.gain(number).is_real()
         ]
         if known is not None:
-            mine = [one.for_faults for one in free]
+            mine = [one.errors for one in free]
             findings = (*known.findings(mine), *findings)
             facts["causes"] = [*known.causes(mine), *facts["causes"]]
             limits = known.limits(limits)
@@ -97,15 +96,15 @@ def _searched(
     unit: Unit, trials: Sequence[Diagnosed], known: Known | None
 ) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, given what the markers prove and other persons show."""
-    options, given = unit.config.diagnosis, [one.for_faults for one in trials]
+    options, given = unit.config.diagnosis, [one.errors for one in trials]
     if known is not None:
         of_all = known.coordinates, known.mean, known.root
-        given = [with_known(one.for_faults, not one.moves, *of_all) for one in trials]
+        given = [with_known(one.errors, not one.moves, *of_all) for one in trials]
     session = session_of(given)
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
-    slips = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]
-    found = search(session, library, options.named_from, slips)
+    slips = [slip.hypothesis(session, t) for t, one in enumerate(trials) for slip in one.slips]
+    found = search(library, options.named_from, slips)
     return found, library, held_out(found.fit)
 
 
@@ -119,7 +118,7 @@ def _of_markers(
     bent = {t for f in findings if f.effect == BEND and f.verdict != "rejected" for t in f.trials}
     number = 0
     for k, one in enumerate(trials, start=1):
-        stem, scene = one.trial.stem, one.for_faults.scene
+        stem, scene = one.trial.stem, one.errors.scene
         for slip in one.slips:
             yield slip.finding(scene, stem, held.gain(number))
             number += 1

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table, table_of
+from bsip_cli.diagnosis.error_model import BLOCK_S
 from bsip_cli.diagnosis.fault_scores import Library, limits_of
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.findings import Finding
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, plain, start_s
+from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, first_blocks
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.running.unit import Unit
 
@@ -77,15 +78,15 @@ def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict
     for one in found.verdicts:
         fault = found.fit.faults[one.number]
         trials = tuple(session.trials[t].name for t in fault.trials)
-        key = plain(fault.effect).name, fault.target, trials
+        key = fault.effect.name, fault.target, trials
         if key in said:
             more = held.values(one.number).tolist(), _bounds(found, one)
             causes.append(cause_record(*key, fault.values, *more, said[key]))
-    starts = first_blocks(session)
-    names = [one.name for one in session.trials]
-    begin = ({"first": first, "start_s": start_s(session, t)} for t, first in enumerate(starts))
-    blocks = dict(zip(names, begin, strict=True))
-    known = {"trials": names, "causes": causes, "blocks": blocks}
+    blocks = {
+        one.name: {"first": first, "start_s": float(one.times_s[0])}
+        for one, first in zip(session.trials, first_blocks(session), strict=True)
+    }
+    known = {"trials": [*blocks], "causes": causes, "blocks": blocks}
     return known | {"block_s": BLOCK_S, "folds": FOLDS}
 
 
@@ -107,27 +108,26 @@ def cause_record(
 def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
     """Standard deviation of all that a fault reports, by the slope of that."""
     fit, one = found.fit, found.fit.faults[verdict.number]
-    session, typical = fit.session, one.typical(found.fit.session)
     mine = fit.coefficients(verdict.number)
     slopes = []
-    for step in _STEP * np.diag(typical):
+    for step in _STEP * np.diag(one.typical):
         ahead, behind = (
-            np.array([x for *_, x in one.with_values(session, v).reported(session)])
+            np.array([x for *_, x in one.with_values(v).reported()])
             for v in (one.values + step, one.values - step)
         )
         slopes.append((ahead - behind) / (2 * _STEP))
     slope = np.stack(slopes, axis=1)
     spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance[mine, mine], slope))
-    names = [name for name, *_ in one.reported(session)]
+    names = [name for name, *_ in one.reported()]
     return dict(zip(names, spread.tolist(), strict=True))
 
 
 def detection_rows(found: Found, library: Library, named_from: float) -> pd.DataFrame:
     """The ``detection`` artifact: the smallest size of every fault that would have been named."""
-    session = found.fit.session
     rows = []
-    for limit in limits_of(session, library, found.scores, named_from):
-        asked, trials = limit.place.candidate, [session.trials[t].name for t in limit.place.trials]
-        row = {"effect": asked.effect.name, "target": asked.target, "parameter": limit.parameter}
+    for limit in limits_of(library, found.scores, named_from):
+        effect, target, numbers = limit.kind
+        trials = [library.session.trials[t].name for t in numbers]
+        row = {"effect": effect.name, "target": target, "parameter": limit.parameter}
         rows.append(row | {"unit": limit.unit, "limit": limit.size, "trials": ", ".join(trials)})
     return table_of("detection", rows)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 from zlib import crc32
 
@@ -16,7 +15,6 @@ from bsip_cli.diagnosis import support
 from bsip_cli.diagnosis.error_budget import Ground, ground_of
 from bsip_cli.diagnosis.error_model import TrialErrors
 from bsip_cli.diagnosis.error_terms import FAULT, Term, error_terms, noise_of_instruments
-from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
@@ -59,15 +57,10 @@ class Diagnosed:
     def moves(self) -> bool:
         return self.trial.role != STATIC
 
-    @cached_property
-    def for_faults(self) -> FaultTrial:
-        """As the search for faults takes it."""
-        return FaultTrial(self.errors, slow(self.scene))
-
     def with_causes(self, causes: Sequence[Mapping]) -> TrialErrors:
         """With terms of the causes that concern it, as in the facts of ``overall-diagnosis``."""
         mine = [one for one in causes if self.trial.stem in one["trials"]]
-        named = tuple(_named(slow(self.scene), self.errors.filter, mine))
+        named = tuple(_named(self.errors.scene, self.errors.filter, mine))
         return replace(self.errors, terms=(*self.errors.terms, *named))
 
 
@@ -172,7 +165,7 @@ def diagnosed(
     noise = noise_of_instruments(
         fewer, filter_.reference_m, marker_noise_m, scene.rate_hz, options.cutoff_hz
     )
-    errors = TrialErrors(trial.stem, filter_, residual, tuple(terms), noise)
+    errors = TrialErrors(trial.stem, fewer, filter_, residual, tuple(terms), noise)
     held = None if contact is None else support.Support(**contact)
     return Diagnosed(trial, scene, errors, ground, held, *markers)
 
@@ -184,8 +177,7 @@ def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator
         if effect is None:
             continue  # a pattern without a cause: it belongs to the unknown
         values = np.asarray(one["values"], dtype=float)
-        typical = [p.typical for p in effect.parameters(scene, target) if not p.scan]
-        columns = filter_(effect.tangent(scene, target, values) * np.array(typical))
+        columns = filter_(effect.signature(scene, target, values))
         known = filter_.one(effect.change(scene, target, values))
         name, alone = FAULT + effect.name, len(one["trials"]) == 1
         yield Term(name, target, f"{name} {target} named", alone, columns, known)

@@ -19,7 +19,6 @@ from bsip_cli.diagnosis.cause import (
     Cause,
     change_by,
     corrected_wrench,
-    is_of_the_forces,
     method_of,
     unseen_change_by,
 )
@@ -232,7 +231,7 @@ def _held_out(unit: Unit, judgement: reconstruct.Judgement) -> str:
 
 
 def _corrected(scene: Scene, measured: pd.DataFrame, causes: list[Cause]) -> pd.DataFrame:
-    if not any(is_of_the_forces(cause) for cause in causes):
+    if not any(cause.effect.of_the_forces for cause in causes):
         return empty_table("corrected-wrench")
     of_the_plates = replace(scene, valid=measured["valid"].to_numpy())
     wrench, valid = corrected_wrench(of_the_plates, measured[WRENCH].to_numpy(), causes)

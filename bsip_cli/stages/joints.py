@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.artifacts import table_of
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Cause, corrected_plates, is_of_the_forces, method_of
+from bsip_cli.diagnosis.cause import Cause, corrected_plates, method_of
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.dynamics.joint_moments import (
     Ground,
@@ -322,13 +322,13 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        others = (one.effect for one in among if not is_of_the_forces(one))
+        others = (one.effect for one in among if not one.effect.of_the_forces)
         fitting = (one.on_its_segment or isinstance(one, _FIT) for one in others)
         if not all(fitting):
             why = "what moves joints or markers would need another motion"
             unit.say(f"no joint moments of {method_of(among)}: {why}")
             return
-        forces = [one for one in among if is_of_the_forces(one)]
+        forces = [one for one in among if one.effect.of_the_forces]
         corrected = corrected_plates(replace(scene, valid=trial.measured), forces)
         pairs = zip(trial.readings, trial.plates, strict=True)
         freed = [replace(one, wrench=corrected.get(name, one.wrench)) for one, name in pairs]

@@ -10,7 +10,7 @@ from operator import itemgetter
 import numpy as np
 import pandas as pd
 
-from bsip_cli.diagnosis.fault_model import FaultTrial
+from bsip_cli.diagnosis.error_model import TrialErrors
 from bsip_cli.diagnosis.findings import Finding, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
 from bsip_cli.diagnosis.shared_faults import (
@@ -43,7 +43,7 @@ class Known:
     rows: pd.DataFrame
     own: Mapping[Coordinate, tuple[float, float]]
 
-    def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
+    def findings(self, trials: Sequence[TrialErrors]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""
         named = self.rows[self.rows["verdict"] == "named"]
         for (name, target), rows in named.groupby(["effect", "target"], sort=False):
@@ -76,7 +76,7 @@ class Known:
         ends = [parameter.typical * x for x in (mean, mean - Z95 * sd, mean + Z95 * sd)]
         return Number(parameter.name, parameter.unit, *ends)
 
-    def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
+    def causes(self, trials: Sequence[TrialErrors]) -> Iterator[dict]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
         and the clock as the others alone show them, who have no other fault."""
         sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))

@@ -12,13 +12,11 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis import laboratory_search
-from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.findings import interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
 from bsip_cli.diagnosis.shared_faults import (
     STATED_MASS,
     Information,
-    SharedTrial,
     information_of,
     inner,
 )
@@ -64,8 +62,8 @@ def run_person(unit: Unit) -> None:
         if any(one.moves for one in usable):
             scenes = [one.scene for one in usable if one.moves]
             moments = np.concatenate([one.times_s[one.valid] - one.times_s[0] for one in scenes])
-            trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in usable]
-            rows += _session_rows(session, information_of(trials))
+            trials, standing = [x.errors for x in usable], [not x.moves for x in usable]
+            rows += _session_rows(session, information_of(trials, standing))
             sessions[session] = {
                 "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
                 "trials": [one.trial.stem for one in usable],
@@ -229,9 +227,7 @@ def _rows(
 
 
 def _rows_of(
-    found: laboratory_search.Verdict | laboratory_search.Deviation,
-    counts: tuple[int, int],
-    cells: Mapping[str, str],
+    found: laboratory_search.Verdict, counts: tuple[int, int], cells: Mapping[str, str]
 ) -> Iterator[dict]:
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}

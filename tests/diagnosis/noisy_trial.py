@@ -8,9 +8,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.body.anthropometry import regress
-from bsip_cli.diagnosis.error_model import TrialErrors
+from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of
 from bsip_cli.diagnosis.error_terms import error_terms, noise_of_instruments
-from bsip_cli.diagnosis.fault_model import FaultTrial, Session, session_of
 from bsip_cli.diagnosis.filtering import filter_of, slow
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
@@ -73,10 +72,10 @@ def errors_of(scene: Scene, name: str = "a") -> TrialErrors:
         for one in error_terms(fewer, prior_root(), 0.005, 2.0)
     )
     noise = noise_of_instruments(fewer, low.reference_m, MARKER_NOISE_M, scene.rate_hz, CUTOFF_HZ)
-    return TrialErrors(name, low, residual, terms, noise)
+    return TrialErrors(name, fewer, low, residual, terms, noise)
 
 
 def session(*scenes: Scene) -> Session:
     """Trials a, b, ... of one person."""
     named = zip("abcdef", scenes, strict=False)
-    return session_of([FaultTrial(errors_of(scene, name), slow(scene)) for name, scene in named])
+    return session_of([errors_of(scene, name) for name, scene in named])

@@ -16,13 +16,19 @@ from bsip_cli.diagnosis.cause import (
     change_by,
     corrected_plates,
     corrected_wrench,
-    is_of_the_forces,
     method_of,
     unseen_change_by,
 )
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.loads import AddedMass
-from bsip_cli.effects.plates import ClockDrift, Delay, PlateRotation, PlateZero, SyncOffset
+from bsip_cli.effects.plates import (
+    ClockDrift,
+    Delay,
+    PlateRotation,
+    PlateTranslation,
+    PlateZero,
+    SyncOffset,
+)
 from bsip_cli.effects.scene import Scene
 from tests.effects.moving_scene import moving
 
@@ -107,8 +113,8 @@ def test_frames_beside_a_gap_are_not_valid_after_the_shift():
 def test_only_forces_are_put_right():
     """What a person carries is truly on the plate."""
     carried = cause_of(AddedMass(), "hand_r", 1.0, 0.0, 0.0, 0.0)
-    assert not is_of_the_forces(carried)
-    assert all(is_of_the_forces(cause) for cause in (OFFSET, LATE, SLOW))
+    assert not carried.effect.of_the_forces
+    assert all(cause.effect.of_the_forces for cause in (OFFSET, LATE, SLOW))
 
 
 def test_plates_that_turned_together_turn_about_the_middle_of_all():
@@ -137,3 +143,26 @@ def test_a_plate_is_freed_of_its_own_faults_only():
     change = np.delete(found["1"] - first.wrench, 5, axis=0)
     assert change[:, 2] == pytest.approx(-30.0, abs=1e-9)
     assert np.array_equal(found[second.name], second.wrench)
+
+
+# --- several at once ----------------------------------------------------------------------------
+
+
+def test_delays_are_one_delay_and_the_rest_adds_up():
+    scene, early = moving(), cause_of(SyncOffset(), "", -0.034)
+    assert not change_by([LATE, early], scene).any()
+    added = change_by([LATE], scene) + change_by([early], scene)
+    assert np.abs(added[20:-20]).max() > 1.0
+    together = change_by([LATE, OFFSET], scene)
+    parts = change_by([LATE], scene) + change_by([OFFSET], scene)
+    np.testing.assert_allclose(together, parts, atol=1e-9)
+
+
+def test_what_plates_do_wrong_comes_as_late_as_their_forces():
+    scene, shift = moving(), cause_of(PlateTranslation(), "1", 0.02, 0.0, 0.0)
+    wrong = change_by([shift], scene)
+    at = np.minimum(scene.times_s + LATE.values[0], scene.times_s[-1])
+    later = CubicSpline(scene.times_s, wrong)(at)
+    together, expected = change_by([LATE, shift], scene), change_by([LATE], scene) + later
+    np.testing.assert_allclose(together, expected, atol=1e-9)
+    assert np.abs(later - wrong).max() > 0.1

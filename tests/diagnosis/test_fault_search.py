@@ -13,7 +13,7 @@ from bsip_cli.diagnosis.fault_model import corrected, fitted
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
-from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
+from bsip_cli.diagnosis.held_out import held_out, unevenness
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
@@ -40,7 +40,7 @@ def movement(seed: int, first_s: float = 0.0) -> Scene:
 def found_in(*scenes: Scene, asked: Sequence = ASKED) -> Found:
     trials = session(*scenes)
     library = library_of(trials, asked, range(len(scenes)), ODDS)
-    return search(trials, library, NAMED_FROM)
+    return search(library, NAMED_FROM)
 
 
 def told(found: Found) -> list[Finding]:
@@ -129,12 +129,9 @@ def half_late(seed: int) -> Scene:
 def unevenness_of_a_delay(*scenes: Scene) -> float:
     """Of the delay that a search has found which asks for nothing else."""
     trials = session(*scenes)
-    found = search(
-        trials, library_of(trials, [EFFECTS["sync_offset"]], range(len(scenes)), ODDS), NAMED_FROM
-    )
-    (number,) = (
-        k for k, one in enumerate(found.fit.faults) if plain(one.effect).name == "sync_offset"
-    )
+    library = library_of(trials, [EFFECTS["sync_offset"]], range(len(scenes)), ODDS)
+    found = search(library, NAMED_FROM)
+    (number,) = (k for k, one in enumerate(found.fit.faults) if one.effect.name == "sync_offset")
     return unevenness(found.fit, number, np.ones(len(scenes)))
 
 
@@ -156,8 +153,9 @@ def test_plates_that_are_moved_in_the_middle_of_two_trials_are_uneven(seed):
             )
             for x in trials
         ]
-        one = Hypothesis(shift, "all", (0, 1), np.array([0.008, 0, 0]))
-        return unevenness(corrected(fitted(session(*scenes), [one])), 0, np.ones(2))
+        both = session(*scenes)
+        one = Hypothesis(shift, "all", (0, 1), np.array([0.008, 0, 0]), both)
+        return unevenness(corrected(fitted(both, [one])), 0, np.ones(2))
 
     assert moved_from(-1.0) < 0
     assert moved_from(4.9) > 5
@@ -220,11 +218,11 @@ def least_delay(times: float) -> float:
         noisy(part_of_moving(0.0, 8.0), 5, times), noisy(part_of_moving(8.0, 8.0), 6, times)
     )
     library = library_of(trials, ASKED, (0, 1), ODDS)
-    found = search(trials, library, NAMED_FROM)
+    found = search(library, NAMED_FROM)
     (limit,) = (
         one.size
-        for one in limits_of(trials, library, found.scores, NAMED_FROM)
-        if one.place.candidate.effect.name == "sync_offset" and len(one.place.trials) == 2
+        for one in limits_of(library, found.scores, NAMED_FROM)
+        if one.kind.effect.name == "sync_offset" and len(one.kind.trials) == 2
     )
     return limit
 

@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.fault_model import FaultTrial
-from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.laboratory import (
     Persons,
     alike_in,
@@ -173,14 +171,14 @@ def test_what_the_others_tell_is_the_sum_less_the_own():
 def test_what_is_known_of_the_clock_is_no_residual_any_more():
     """And what is not known of it stays as a term of that size."""
     scene = late(noisy(moving(), 1), 0.01)
-    trial = FaultTrial(errors_of(scene), slow(scene))
+    trial = errors_of(scene)
     known = with_known(trial, False, (DELAY,), np.array([1.0]), np.array([[0.05]]))
-    before, after = ((x.errors.residual**2).mean(axis=0)[:3] for x in (trial, known))
+    before, after = ((x.residual**2).mean(axis=0)[:3] for x in (trial, known))
     assert (after < 0.2 * before).all()
-    (term,) = (x for x in known.errors.terms if x.term == "fault:laboratory")
-    slope = (known.errors.residual - trial.errors.residual)[..., None]
+    (term,) = (x for x in known.terms if x.term == "fault:laboratory")
+    slope = (known.residual - trial.residual)[..., None]
     assert np.allclose(term.of_unit_variance, -0.05 * slope)
-    assert not any(x.term == "fault:sync_offset" for x in known.errors.terms)
+    assert not any(x.term == "fault:sync_offset" for x in known.terms)
 
 
 def test_no_memory_but_what_is_kept_grows_with_the_persons():

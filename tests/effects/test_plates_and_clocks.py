@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.dynamics.ground_wrench import centre_of_pressure, pinocchio_model, predicted_wrench
@@ -22,7 +21,6 @@ from bsip_cli.effects.plates import (
     PlateTranslation,
     PlateZero,
     SyncOffset,
-    joint_change,
 )
 from bsip_cli.effects.scene import Plate, Scene
 from tests.body.standing_person import Swing, standing
@@ -258,31 +256,3 @@ def test_words_for_the_order_of_clocks():
     assert delay.words(scene, "", np.array([-0.01])).what.endswith("10.0 ms before the markers")
     assert "at 0.833 times" in FrameRate().words(scene, "", np.array([1 / 1.2 - 1])).what
     assert "1000 ppm slower" in ClockDrift().words(scene, "", np.array([1e-3])).what
-
-
-# --- several at once ----------------------------------------------------------------------------
-
-
-def test_delays_are_one_delay_and_the_rest_adds_up():
-    scene = moving()
-    late, early = np.array([0.03]), np.array([-0.03])
-    both = [(SyncOffset(), "", late), (SyncOffset(), "", early)]
-    assert not joint_change(scene, both).any()
-    added = SyncOffset().change(scene, "", late) + SyncOffset().change(scene, "", early)
-    assert np.abs(added[20:-20]).max() > 1.0
-    offset = (PlateZero(), "1 fz", np.array([10.0]))
-    together = joint_change(scene, [both[0], offset])
-    parts = SyncOffset().change(scene, "", late) + PlateZero().change(scene, *offset[1:])
-    np.testing.assert_allclose(together, parts, atol=1e-9)
-
-
-def test_what_plates_do_wrong_comes_as_late_as_their_forces():
-    scene, shift = moving(), (PlateTranslation(), "1", np.array([0.02, 0.0, 0.0]))
-    late_s = 0.02
-    delay = (SyncOffset(), "", np.array([late_s]))
-    together = joint_change(scene, [delay, shift])
-    wrong = PlateTranslation().change(scene, *shift[1:])
-    later = CubicSpline(scene.times_s, wrong)(np.minimum(scene.times_s + late_s, scene.times_s[-1]))
-    expected = SyncOffset().change(scene, *delay[1:]) + later
-    np.testing.assert_allclose(together, expected, atol=1e-9)
-    assert np.abs(later - wrong).max() > 0.1

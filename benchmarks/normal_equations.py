@@ -106,7 +106,8 @@ def known_problem(duration_s: float) -> Problem:
 def fit_table(problem: Problem, rounds: int) -> str:
     """Time of ``consistent``, and how near one solve comes to clarabel's optimum."""
     terms = terms_of(problem)
-    objective = objective_of(terms, fit_with_weights(terms).weights)
+    fit = fit_with_weights(terms)
+    objective = objective_of(terms, fit.spread, fit.gamma)
     seconds = interleaved(
         {
             "consistent, all weights": lambda: cpu_seconds(lambda: consistent.estimate(problem)),

@@ -31,9 +31,14 @@ from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
-from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from, person_of
+from bsip_cli.stages.frames import (
+    coordinates_from,
+    markers_from,
+    person_from,
+    person_of,
+    plate_wrenches,
+)
 from bsip_cli.stages.joints import trial_of
-from bsip_cli.stages.trial_scene import plate_names
 from bsip_cli.study.study import describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
@@ -75,7 +80,7 @@ def _bids(unit: Unit, _: str) -> Texts:
     kinematics, wrench = unit.read("kinematics"), unit.read("wrench")
     times, labels, places = markers_from(unit.read("markers"))
     q = coordinates_from(kinematics, skeleton)[0]
-    plates = {n: wrench[[f"plate{n}_{c}" for c in WRENCH]].to_numpy() for n in plate_names(wrench)}
+    plates = plate_wrenches(wrench)
     determined = kinematics["determined"].to_numpy()
     columns = bids_motion.channels(labels, places, skeleton, q, determined, plates)
     session = f"ses-{trial.session}" if trial.session else ""

@@ -37,7 +37,7 @@ from bsip_cli.recordings.session_reading import Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import markers_from, person_of
+from bsip_cli.stages.frames import markers_from, person_of, plate_wrenches
 from bsip_cli.stages.survey import opened, reading_of
 from bsip_cli.stages.trial_scene import plates_of
 
@@ -292,7 +292,7 @@ class _Correction:
         table = unit.read("wrench")
         plates = tuple(
             replace(plate, wrench=reading, silent=is_silent(reading))
-            for plate in plates_of(unit.read("plates"), table)
+            for plate in plates_of(unit.read("plates"), plate_wrenches(table))
             if plate.name in self._plates
             for reading in [self._understood(plate.name)]
         )

@@ -94,7 +94,7 @@ def error_terms(
     this many times as far as the residuals of its markers show.
     """
     skeleton, model = scene.person.skeleton, scene.model
-    regressor = wrench_regressor(model, model.createData(), scene.q, scene.v, scene.a, np.zeros(3))
+    regressor = wrench_regressor(model, scene.q, scene.v, scene.a, np.zeros(3))
     segments = skeleton.body_names
     yield Term(INERTIA, "", INERTIA, False, regressor, None, root, segments)
     heavier = _HEAVIER * scene.phi[:, None]

@@ -39,7 +39,11 @@ def find_basis(model: pin.Model, known: np.ndarray | None = None) -> Basis:
 
     known : (10 n,) parameters that are known and so in no combination; None for none.
     """
-    stacked = np.concatenate(random_regressor(model, _STATES))
+    rng, neutral = np.random.default_rng(_SEED), pin.neutral(model)
+    steps = rng.uniform(-1.5, 1.5, (_STATES, model.nv))
+    q = np.stack([pin.integrate(model, neutral, step) for step in steps])
+    v, a = rng.normal(0, 3, steps.shape), rng.normal(0, 20, steps.shape)
+    stacked = np.concatenate(wrench_regressor(model, q, v, a, np.zeros(3)))
     if known is not None:
         stacked = stacked * ~known
     scale = np.linalg.norm(stacked, axis=0)
@@ -62,19 +66,6 @@ def find_basis(model: pin.Model, known: np.ndarray | None = None) -> Basis:
     combine[np.arange(len(independent)), independent] = 1.0
     combine[:, dependent] = beta
     return Basis(independent, combine)
-
-
-def random_regressor(model: pin.Model, states: int) -> np.ndarray:
-    """(states, 6, 10 n) regressor at random configurations, velocities and accelerations."""
-    rng = np.random.default_rng(_SEED)
-    q = np.stack(
-        [
-            pin.integrate(model, pin.neutral(model), rng.uniform(-1.5, 1.5, model.nv))
-            for _ in range(states)
-        ]
-    )
-    v, a = rng.normal(0, 3, (states, model.nv)), rng.normal(0, 20, (states, model.nv))
-    return wrench_regressor(model, model.createData(), q, v, a, np.zeros(3))
 
 
 def expressions(basis: Basis, segments: tuple[str, ...]) -> list[tuple[str, str, str]]:

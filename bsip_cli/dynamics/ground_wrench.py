@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,12 +44,7 @@ def bodies_of(model: pin.Model) -> list[int]:
 
 
 def wrench_regressor(
-    model: pin.Model,
-    data: pin.Data,
-    q: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    reference_m: np.ndarray,
+    model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray, reference_m: np.ndarray
 ) -> np.ndarray:
     """(N, 6, 10 n) regressor of the ground wrench of n segments with mass, in world axes about a
     reference point.
@@ -60,7 +54,7 @@ def wrench_regressor(
     first, then moments [N m]; q (N, nq), v and a (N, nv) as Pinocchio has them.
     """
     columns = (10 * (np.array(bodies_of(model)) - 1)[:, None] + np.arange(10)).ravel()
-    rows = np.empty((len(q), 6, len(columns)))
+    rows, data = np.empty((len(q), 6, len(columns))), model.createData()
     for k in range(len(q)):
         of_all = pin.computeJointTorqueRegressor(model, data, q[k], v[k], a[k])
         rows[k] = of_all[:6, columns]
@@ -81,24 +75,10 @@ def predicted_wrench(
 ) -> np.ndarray:
     """(N, 6, k) wrench of k parameter vectors phi (10 n, k); memory grows with ``block`` only."""
     wrench = np.empty((len(q), 6, phi.shape[1]))
-    for part, rows in regressor_blocks(model, q, v, a, reference_m, block):
-        wrench[part] = rows @ phi
-    return wrench
-
-
-def regressor_blocks(
-    model: pin.Model,
-    q: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    reference_m: np.ndarray,
-    block: int,
-) -> Iterator[tuple[slice, np.ndarray]]:
-    """The regressor, ``block`` frames at a time."""
-    data = model.createData()
     for start in range(0, len(q), block):
-        part = slice(start, min(start + block, len(q)))
-        yield part, wrench_regressor(model, data, q[part], v[part], a[part], reference_m)
+        part = slice(start, start + block)
+        wrench[part] = wrench_regressor(model, q[part], v[part], a[part], reference_m) @ phi
+    return wrench
 
 
 def move_moments(wrench: np.ndarray, reference_m: np.ndarray) -> np.ndarray:

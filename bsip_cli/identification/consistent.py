@@ -225,19 +225,16 @@ class Terms:
 
 
 @dataclass(frozen=True, eq=False)
-class Weights:
-    """Of the deviations, one per spread, 1 as the options say, and of the log-det term."""
+class Fit:
+    """Optimum with its evidence, the covariance before the data, and how many of the body's
+    parameters the data decided.
+
+    spread : weights of the deviations, one per spread, 1 as the options say. gamma : that of the
+    log-det term.
+    """
 
     spread: np.ndarray
     gamma: float
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Optimum with its weights, its evidence, the covariance before the data, and how many of the
-    body's parameters the data decided."""
-
-    weights: Weights
     optimum: Optimum
     evidence: float
     prior_covariance: np.ndarray
@@ -280,19 +277,14 @@ def _inverse_root(precision: np.ndarray) -> np.ndarray:
     return scale[:, None] * np.linalg.inv(lower).T
 
 
-def objective_of(terms: Terms, weights: Weights) -> Objective:
+def objective_of(terms: Terms, spread: np.ndarray, gamma: float) -> Objective:
     """The convex problem for given weights."""
-    return Objective(
-        np.diag(terms.strength) + _precision(terms, weights),
-        terms.right,
-        terms.shown,
-        terms.table,
-        weights.gamma,
-    )
+    quadratic = np.diag(terms.strength) + _precision(terms, spread)
+    return Objective(quadratic, terms.right, terms.shown, terms.table, gamma)
 
 
-def _precision(terms: Terms, weights: Weights) -> np.ndarray:
-    weighted = (w * p for w, p in zip(weights.spread, terms.spreads, strict=True))
+def _precision(terms: Terms, spread: np.ndarray) -> np.ndarray:
+    weighted = (w * p for w, p in zip(spread, terms.spreads, strict=True))
     return sum(weighted, terms.fixed)
 
 
@@ -302,9 +294,9 @@ def fit_with_weights(terms: Terms) -> Fit:
     best: Fit | None = None
     spread = np.ones(len(terms.spreads))
     for gamma in _GAMMAS:
-        fit = fit_at(terms, Weights(spread, gamma), best)
+        fit = fit_at(terms, spread, gamma, best)
         for _ in range(_ROUNDS):
-            x, old = fit.optimum.x, fit.weights.spread
+            x, old = fit.optimum.x, fit.spread
             removed, count = fit.prior_covariance - fit.optimum.covariance, terms.spread_weight
             new = np.array(  # MacKay's rule
                 [
@@ -315,20 +307,20 @@ def fit_with_weights(terms: Terms) -> Fit:
             )
             new = np.clip(new, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
             new[_NEVER_WIDER] = np.maximum(new[_NEVER_WIDER], 1.0)
-            fit = fit_at(terms, Weights(new, gamma), fit)
+            fit = fit_at(terms, new, gamma, fit)
             if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
         if best is None or fit.evidence > best.evidence:
-            best, spread = fit, fit.weights.spread
+            best, spread = fit, fit.spread
     assert best is not None
     return best
 
 
-def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
+def fit_at(terms: Terms, spread: np.ndarray, gamma: float, near: Fit | None = None) -> Fit:
     """Optimum and evidence for given weights."""
-    optimum = minimise(objective_of(terms, weights), near.optimum.x if near else None)
+    optimum = minimise(objective_of(terms, spread, gamma), near.optimum.x if near else None)
     curvature = hessian(terms.table)
-    before = _precision(terms, weights) + weights.gamma * terms.shown.T @ curvature @ terms.shown
+    before = _precision(terms, spread) + gamma * terms.shown.T @ curvature @ terms.shown
     logs = sum(np.linalg.slogdet(x)[1] for x in (optimum.covariance, before))
     root = _inverse_root(before)
     covariance = root @ root.T
@@ -339,7 +331,7 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
         for x in (optimum.covariance, covariance)
     )
     decided = max(float(decided - (1 - kept / known).sum()), 0.0)
-    return Fit(weights, optimum, float(0.5 * logs - optimum.value), covariance, decided)
+    return Fit(spread, gamma, optimum, float(0.5 * logs - optimum.value), covariance, decided)
 
 
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.
@@ -354,7 +346,7 @@ def estimate(problem: Problem) -> Estimate:
     """
     terms = terms_of(problem)
     fit, shown = fit_with_weights(terms), terms.shown
-    of_the_body = fit.weights.spread[: 2 + len(problem.prior.pairs)]  # the instruments' come after
+    of_the_body = fit.spread[: 2 + len(problem.prior.pairs)]  # the instruments' come after
     masses, centres, *tensors = 1 / np.sqrt(of_the_body)
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "

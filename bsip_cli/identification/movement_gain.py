@@ -196,7 +196,7 @@ def _information(
     q, v, a = motion_of(movement, person, model)
     reference = np.append(q[:, :2].mean(axis=0), 0.0)
     q, v, a = (rows[::_STRIDE] for rows in (q, v, a))
-    regressor = wrench_regressor(model, model.createData(), q, v, a, reference)
+    regressor = wrench_regressor(model, q, v, a, reference)
     regressor = regressor * ~problem.prior.fixed_parameters()
     noise = problem.noise
     independent = noise.effective * DURATION_S / problem.equations.duration_s

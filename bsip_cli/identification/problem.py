@@ -123,12 +123,8 @@ class NormalEquations:
         return np.sqrt(np.maximum(squares, 0.0) / self.samples)
 
 
-@dataclass(frozen=True, eq=False)
-class ResidualSeries:
-    """What a parameter vector leaves of one recording: residual (n, 6), noise level (n,)."""
-
-    residual: np.ndarray
-    noise_level: np.ndarray
+Residual = tuple[np.ndarray, np.ndarray]
+"""What a parameter vector leaves of one recording: (n, 6), and its noise level (n,)."""
 
 
 def accumulate(
@@ -170,14 +166,15 @@ def residual_series(
     cutoff_hz: float,
     reference_m: np.ndarray,
     phi: np.ndarray,
-) -> list[ResidualSeries]:
+) -> list[Residual]:
     """Per recording with usable frames, the filtered residual of a parameter vector."""
     series = []
     for recording in recordings:
         blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m)
         left = [(measured - regressor @ phi, level) for regressor, measured, level in blocks]
         if left:
-            series.append(ResidualSeries(*map(np.concatenate, zip(*left, strict=True))))
+            residual, level = map(np.concatenate, zip(*left, strict=True))
+            series.append((residual, level))
     return series
 
 
@@ -195,13 +192,12 @@ def _filtered_blocks(
     measured = operator @ np.where(
         recording.use[:, None], move_moments(recording.wrench, reference_m), 0.0
     )
-    data = model.createData()
     for start in range(0, operator.shape[0], _ROWS):
         rows: sparse.csr_array = operator[start : start + _ROWS]
         first, last = int(rows.indices.min()), int(rows.indices.max()) + 1
         part = slice(first, last)
         regressor = wrench_regressor(
-            model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
+            model, recording.q[part], recording.v[part], recording.a[part], reference_m
         )
         if instruments:
             columns = instruments.columns(regressor, recording.rate_hz)
@@ -252,10 +248,9 @@ def even_noise(rms: np.ndarray, samples: int) -> Noise:
     return Noise(rms, np.full(6, float(samples)), samples, rms, np.zeros(6))
 
 
-def noise_of(series: list[ResidualSeries]) -> Noise:
+def noise_of(series: list[Residual]) -> Noise:
     """Noise from what a fit leaves, one series per recording."""
-    residual = np.concatenate([one.residual for one in series])
-    level = np.concatenate([one.noise_level for one in series])
+    residual, level = map(np.concatenate, zip(*series, strict=True))
     # standard deviations, steady and per level, of likely Gaussian residuals
     terms = np.stack([np.ones_like(level), level**2], axis=1)
     scale = np.maximum(terms.mean(axis=0), 1e-300)
@@ -270,9 +265,7 @@ def noise_of(series: list[ResidualSeries]) -> Noise:
             variance = terms @ parts[c]
     steady, with_level = np.sqrt(parts / [1.0, scale[1]]).T
     spread = np.sqrt(_variances(steady, with_level, level))
-    ends = np.cumsum([len(one.residual) for one in series])
-    spans = [(int(e - len(s.residual)), int(e)) for e, s in zip(ends, series, strict=True)]
-    counts = [effective_samples(residual[:, c] / spread[:, c], spans) for c in range(6)]
+    counts = [effective_samples(own) for own in (residual / spread).T]
     effective = np.clip(np.nan_to_num(counts, nan=1.0), 1.0, len(residual))
     rms = 1 / np.sqrt((1 / spread**2).mean(axis=0))
     return Noise(rms, effective, len(residual), steady, with_level)
@@ -331,6 +324,3 @@ class Estimate:
     def residual_rms(self, problem: Problem) -> np.ndarray:
         """(6,) residual [N, N m] that the estimate leaves in its own data."""
         return problem.every_equation().residual_rms(self.phi)
-
-
-Estimator = Callable[[Problem], Estimate]

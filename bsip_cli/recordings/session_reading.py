@@ -239,15 +239,17 @@ def _of_own_units(
     most = session_reading([trials[k] for k in units if units[k] == usual], limits)
     if most.refusals():
         return None
-    plates, delays_s = dict(most.plates), dict(most.delays_s)
+    plates, delays_s, drifts_s = dict(most.plates), dict(most.delays_s), dict(most.drifts_s)
     others = {k: both for k, both in units.items() if both != usual}
     for k in others:
         plates = {**alone[k].plates, **plates}
         delays_s |= alone[k].delays_s
+        drifts_s |= alone[k].drifts_s
     return replace(
         most,
         plates=plates,
         delays_s=delays_s,
+        drifts_s=drifts_s,
         moment_scales={trials[k].name: moments for k, (moments, _) in others.items()},
         point_scales={trials[k].name: points for k, (_, points) in others.items()},
     )

@@ -11,14 +11,14 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.support import Support
-from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.words import count, listing, number
 from bsip_cli.running.unit import Unit
+from bsip_cli.stages.frames import WRENCH
 from bsip_cli.statistics import choice
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
-_SIGNALS = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "cop_ap_m", "cop_ml_m"]
+_SIGNALS = [*WRENCH, "cop_ap_m", "cop_ml_m"]
 _COLUMNS = {choice.PAIRS[0]: "om", choice.PAIRS[2]: "rm_mass", choice.PAIRS[1]: "om_rm_mass"}
 _UNKNOWN = dict.fromkeys(choice.PAIRS, choice.Difference(np.nan, np.nan))
 _ALL = "all"  # movements
@@ -166,9 +166,10 @@ def _within(
     judged = measured["valid"].to_numpy() & ~measured["used"].to_numpy()
     signals = [rows.loc[rows["method"] == name, _SIGNALS].to_numpy() for name in METHODS]
     residuals = np.array(signals)[..., components] - measured[_SIGNALS].to_numpy()[:, components]
-    residuals[:, ~np.isfinite(residuals).all(axis=0)] = np.nan  # over the same frames, as in fit
+    known = np.isfinite(residuals).all(axis=0) & judged[:, None]
+    residuals[:, ~known] = np.nan  # over the same frames, as in fit
     first, second = (residuals[METHODS.index(name)] for name in pair)
-    return choice.within(first, second, valid_intervals(judged))
+    return choice.within(first, second)
 
 
 # --- differences ------------------------------------------------------------------------------

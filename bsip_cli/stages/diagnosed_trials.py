@@ -84,9 +84,9 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     trials = unit.trials("kinematics", "wrench")
     scenes = tuple((t, scene_of(unit, person, prior.phi, t)) for t in trials)
     scenes = tuple((t, s) for t, s in scenes if s.valid.any())
-    if not scenes or not is_weighed(unit):
-        return Weighed(scenes, prior, 0.0, ())
     sd = stated_sd(unit)
+    if not scenes or sd is None:
+        return Weighed(scenes, prior, 0.0, ())
     standing = [(t, s) for t, s in scenes if t.role == STATIC][:1]
     if standing:
         share, manner = support.weight_share(standing[0][1]), "in quiet stance"
@@ -113,23 +113,22 @@ def prior_of(
     share : by what part of the stated mass the plates read more, where they are believed instead.
     whatever_mass : how the stated mass is shared out alone, whatever it is.
     """
-    sd_percent = 100 * stated_sd(unit) if share is None else _READ_TO_PERCENT
-    known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
-    known |= {"total_mass_sd_percent": 0.0} if whatever_mass else {}
+    sd, known = stated_sd(unit), {}
+    if whatever_mass:
+        known["total_mass_sd_percent"] = 0.0
+    elif sd is not None:
+        known["total_mass_sd_percent"] = 100 * sd if share is None else _READ_TO_PERCENT
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
     none = np.zeros(len(person.skeleton.bodies), dtype=bool)
     return prior_from(unit, table, person, none, **_ORIGINS, **known)
 
 
-def stated_sd(unit: Unit) -> float:
-    """Standard deviation of a stated mass, part of it."""
+def stated_sd(unit: Unit) -> float | None:
+    """Standard deviation of a mass that a table or a recording states, part of it; else None."""
+    if unit.read("person").iloc[0]["mass_source"] == PLATES:
+        return None
     return 0.01 * unit.config.diagnosis.stated_mass_sd_percent
-
-
-def is_weighed(unit: Unit) -> bool:
-    """Whether the person's mass is a stated one, in a table or in a recording."""
-    return unit.read("person").iloc[0]["mass_source"] != PLATES
 
 
 def diagnosed(

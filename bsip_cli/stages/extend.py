@@ -6,13 +6,14 @@ on data not used to size it, of the person what that gains over all trials that 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from zlib import crc32
 
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import empty_table
+from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import (
     Blocks,
@@ -29,16 +30,18 @@ from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence, gain_sentence
 from bsip_cli.report.words import segment_label
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import column_names
 from bsip_cli.stages import identification_problem, reconstruct
-from bsip_cli.stages.frames import WRENCH, bsip_table, load_phi, person_of
-from bsip_cli.stages.trial_scene import blocks_of, body_as_sized, causes_of, scene_of
+from bsip_cli.stages.frames import WRENCH, XYZ, bsip_table, columns, parameters_of, person_of
+from bsip_cli.stages.trial_scene import (
+    blocks_of,
+    body_as_sized,
+    causes_of,
+    extended_models,
+    scene_of,
+)
 from bsip_cli.statistics.choice import BlockErrors, block_errors, pooled
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 from bsip_cli.study.study import Trial
-
-_COM = ["com_x_m", "com_y_m", "com_z_m"]
-_COM_CHANGE = ["com_x_change_m", "com_y_change_m", "com_z_change_m"]
 
 
 def run_person(unit: Unit) -> None:
@@ -46,8 +49,7 @@ def run_person(unit: Unit) -> None:
     person = person_of(unit)
     causes = causes_of(unit)
     bent = [cause for cause in causes if isinstance(cause.effect, MissingJoint)]
-    parts = _torso_rows(person, bent[0]) if bent else empty_table("extended-skeleton")
-    unit.write("extended-skeleton", parts)
+    unit.write("extended-skeleton", list(_torso_rows(person, bent[0])) if bent else ())
     bsip, stems = unit.read("bsip"), set(unit.read("used-blocks")["trial"])
     trials = [trial for trial in unit.trials("kinematics", "wrench") if trial.stem in stems]
     if causes and not trials:
@@ -69,7 +71,7 @@ def run_person(unit: Unit) -> None:
 def _extended(
     unit: Unit, person: Person, bsip: pd.DataFrame, causes: tuple[Cause, ...], trials: list[Trial]
 ) -> pd.DataFrame:
-    methods, parameters = reconstruct.parameters_of(bsip, person)
+    methods, parameters = parameters_of(bsip, person)
     phi = body_as_sized(unit, parameters[:, methods.index(RM)])
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
@@ -104,48 +106,46 @@ def _identified(
 
 
 def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
-    om = bsip[bsip["method"] == OM].set_index("segment")
-    tables = []
-    for method in dict.fromkeys(extended["method"]):
-        after = extended[extended["method"] == method].set_index("segment")
-        shift = (after[["mass_kg", *_COM]] - om.loc[after.index, ["mass_kg", *_COM]]).to_numpy()
-        mass, length = shift[:, 0], np.linalg.norm(shift[:, 1:], axis=1)
-        table = pd.DataFrame({"method": method, "segment": list(after.index)})
-        table[["mass_change_kg", *_COM_CHANGE]] = shift
-        table["com_change_m"] = length
-        words: list[list[str]] = [[] for _ in mass]
-        for name, sizes in (("mass", np.abs(mass)), ("centre of mass", length)):
-            if sizes.max() > 0:
-                words[int(sizes.argmax())].append(name)
-        table["largest"] = [" and ".join(found) for found in words]
-        table["sentence"] = [
-            f"{segment_label(segment)}: mass {m:+.3f} kg, centre of mass moved by {1000 * x:.1f} mm"
-            for segment, m, x in zip(after.index, mass, length, strict=True)
-        ]
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+    numbers = ["mass_kg", "com_x_m", "com_y_m", "com_z_m"]
+    changes = ["mass_change_kg", "com_x_change_m", "com_y_change_m", "com_z_change_m"]
+    om = bsip[bsip["method"] == OM].set_index("segment")[numbers]
+    rows = []
+    for method, after in extended.groupby("method", sort=False):
+        after = after.set_index("segment")[numbers]
+        shifts = (after - om.loc[after.index]).to_numpy()
+        lengths = np.linalg.norm(shifts[:, 1:], axis=1)
+        sizes = {"mass": np.abs(shifts[:, 0]), "centre of mass": lengths}
+        largest = {name: int(x.argmax()) for name, x in sizes.items() if x.max() > 0}
+        for k, segment in enumerate(after.index):
+            row = {"method": method, "segment": segment, "com_change_m": lengths[k]}
+            row |= dict(zip(changes, shifts[k], strict=True))
+            row["largest"] = " and ".join(name for name, at in largest.items() if at == k)
+            mass = f"mass {shifts[k, 0]:+.3f} kg"
+            moved = f"centre of mass moved by {1000 * lengths[k]:.1f} mm"
+            rows.append(row | {"sentence": f"{segment_label(segment)}: {mass}, {moved}"})
+    return table_of("bsip-change", rows)
 
 
 # --- skeleton ---------------------------------------------------------------------------------
 
 
-def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
+def _torso_rows(person: Person, cause: Cause) -> Iterator[dict]:
     """The two parts of the torso, whose second joint was named."""
     split = split_torso(person, cause.target, cause.values)
     skeleton, i = person.skeleton, person.skeleton.index(split.segment)
     below, above = f"{split.segment}_below", f"{split.segment}_above"
-    whole = person.origin_in_joint_m[i]
+    length_m = float(np.linalg.norm(person.origin_in_joint_m[i]))
     shares = np.array(split.shares)
     parent = skeleton.segments[skeleton.parents[i]]
     parts = (
         (below, parent, skeleton.joints[i], person.joint_in_parent_m[i], split.below, 1 - shares),
         (above, below, "T12/L1", split.joint_m, 1 - split.below, shares),
     )
-    columns = ["segment", "parent", "joint", "joint_x_m", "joint_y_m", "joint_z_m", "mass_share"]
-    rows = [(*names, *place, part, *turned) for *names, place, part, turned in parts]
-    table = pd.DataFrame(rows, columns=[*columns, *(f"{axis}_share" for axis in AXES)])
-    table["length_m"] = table["mass_share"] * float(np.linalg.norm(whole))
-    return table[column_names("extended-skeleton")]
+    for segment, parent, joint, place, share, turned in parts:
+        row = {"segment": segment, "parent": parent, "joint": joint, "mass_share": share}
+        row |= dict(zip([f"joint_{name}" for name in XYZ], place, strict=True))
+        row |= dict(zip([f"{axis}_share" for axis in AXES], turned, strict=True))
+        yield row | {"length_m": share * length_m}
 
 
 # --- a trial: the extended model, RM and OM -----------------------------------------------------
@@ -153,53 +153,35 @@ def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
 
 def run_trial(unit: Unit) -> None:
     """Read the causes, motion, wrench and parameters; write the gain, amend the comparison."""
-    causes, extended = causes_of(unit), unit.read("extended-bsip")
-    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
-    if not own or extended.empty:
+    models = extended_models(unit, person_of(unit))
+    if models is None:
         for kind in ("gain", "corrected-wrench"):
             unit.write(kind, ())
         for kind in ("reconstruction", "fit"):
             unit.amend(kind, empty_table(kind))  # RM and OM stand alone
         return
-    person = person_of(unit)
-    measured = unit.read("wrench")
-    judgement = reconstruct.judgement_of(unit, unit.read("kinematics"), measured)
-    blocks = blocks_of(unit, unit.own_trial.stem)
-    # the body for which the causes were sized, and those of OM and of each extended model
-    methods, phi = reconstruct.parameters_of(pd.concat([unit.read("bsip"), extended]), person)
-    scene = scene_of(unit, person, body_as_sized(unit, phi[:, methods.index(RM)]))
-    carried = phi + load_phi(unit, person)[:, None]
-    parameters = dict(zip(methods, carried.T, strict=True))
-    fold = blocks.fold_of(judgement.times_s)
-    raw: reconstruct.Wrenches = {
-        MEASURED: measured[WRENCH].to_numpy(),
-        OM: scene.wrench_of(parameters[OM]),
-    }
-    for place, k in enumerate(own):
-        among = [causes[j] for j in own[: place + 1]]
-        predicted = scene.wrench_of(parameters[method_of(causes[: k + 1])])
-        raw[method_of(among)] = predicted + unseen_change_by(among, scene, fold)
-    wrenches, signals = judgement.compared(raw)
+    scene, blocks = models.scene, blocks_of(unit, unit.own_trial.stem)
+    judgement = reconstruct.judgement_of(unit, scene.times_s, scene.valid)
+    fold, measured = blocks.fold_of(scene.times_s), unit.read("wrench")
+    raw = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(models.om)}
+    for causes, phi in models.steps:
+        raw[method_of(causes)] = scene.wrench_of(phi) + unseen_change_by(causes, scene, fold)
+    signals = judgement.compared(raw)
     ours = [name for name in signals if is_extended(name)]
-    rows = reconstruct.reconstruction_rows(
-        judgement, {name: wrenches[name] for name in ours}, signals
-    )
+    rows = reconstruct.reconstruction_rows(judgement, {name: signals[name] for name in ours})
     unit.amend("reconstruction", rows)
-    alike = reconstruct.over_the_same_frames(signals)
-    unit.amend(
-        "fit", reconstruct.fit_rows(judgement, {name: alike[name] for name in (MEASURED, *ours)})
-    )
-    last = list(signals)[-1]
-    errors = _errors(judgement, signals, last, blocks)
-    rows = reconstruct.gain_rows(
-        errors, last, _held_out(unit, judgement), crc32(unit.name.encode())
-    )
+    alike = reconstruct.over_the_same_frames(signals, judgement.judged)
+    compared = {name: alike[name] for name in (MEASURED, *ours)}
+    unit.amend("fit", reconstruct.fit_rows(judgement, compared))
+    errors = _errors(judgement, signals, ours[-1], blocks)
+    known = ours[-1], _held_out(unit, judgement), crc32(unit.name.encode())
+    rows = reconstruct.gain_rows(errors, *known)
     sums = {  # per block, for the gain over all trials
         component: {name: values.tolist() for name, values in asdict(one).items()}
         for component, one in errors.items()
     }
-    unit.write("gain", rows, facts={"method": last, "data": judgement.data, "blocks": sums})
-    unit.write("corrected-wrench", _corrected(scene, measured, [causes[k] for k in own]))
+    unit.write("gain", rows, facts={"method": ours[-1], "data": judgement.data, "blocks": sums})
+    unit.write("corrected-wrench", _corrected(scene, measured, causes))
 
 
 def _errors(
@@ -235,9 +217,7 @@ def _corrected(scene: Scene, measured: pd.DataFrame, causes: list[Cause]) -> pd.
         return empty_table("corrected-wrench")
     of_the_plates = replace(scene, valid=measured["valid"].to_numpy())
     wrench, valid = corrected_wrench(of_the_plates, measured[WRENCH].to_numpy(), causes)
-    table = pd.DataFrame(wrench, columns=WRENCH)
-    table.insert(0, "time_s", scene.times_s)
-    return table.assign(valid=valid)
+    return pd.DataFrame({"time_s": scene.times_s} | columns(WRENCH, wrench) | {"valid": valid})
 
 
 # --- the gain over all trials ---------------------------------------------------------------------

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person, load_parameters
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.report.words import listing, segment_label
@@ -13,13 +18,14 @@ from bsip_cli.schemas import bsip_names, share_name
 from bsip_cli.study.study import Trial
 
 WRENCH = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm"]
+XYZ = ["x_m", "y_m", "z_m"]
 
 
 def markers_from(frame: pd.DataFrame) -> tuple[np.ndarray, tuple[str, ...], np.ndarray]:
     """Times (N,), labels and positions (N, m, 3) [m] of a ``markers`` table."""
     first = frame["time_s"].iloc[0]
     labels = tuple(frame.loc[frame["time_s"] == first, "marker"])
-    positions = frame[["x_m", "y_m", "z_m"]].to_numpy().reshape(-1, len(labels), 3)
+    positions = frame[XYZ].to_numpy().reshape(-1, len(labels), 3)
     return frame["time_s"].to_numpy()[:: len(labels)], labels, positions
 
 
@@ -41,14 +47,14 @@ def person_from(
     rows = skeleton_rows.set_index("segment").loc[list(skeleton.segments)]
     return Person(
         skeleton,
-        rows[["joint_x_m", "joint_y_m", "joint_z_m"]].to_numpy(),
+        rows[[f"joint_{name}" for name in XYZ]].to_numpy(),
         rows["parent_tilt_rad"].to_numpy(),
         rows["child_tilt_rad"].to_numpy(),
-        rows[["origin_x_m", "origin_y_m", "origin_z_m"]].to_numpy(),
+        rows[[f"origin_{name}" for name in XYZ]].to_numpy(),
         rows["length_m"].to_numpy(),
         tuple(marker_rows["marker"]),
         np.array([skeleton.index(name) for name in marker_rows["segment"]]),
-        marker_rows[["x_m", "y_m", "z_m"]].to_numpy(),
+        marker_rows[XYZ].to_numpy(),
         marker_rows["weight"].to_numpy(),
         rows["held"].to_numpy(),
     )
@@ -69,13 +75,67 @@ def coordinates_from(
     return q, v, a
 
 
-def acceleration_noise(frame: pd.DataFrame, skeleton: Skeleton) -> np.ndarray:
-    """(N,) noise level of the pelvis' acceleration [m/s2] of a ``kinematics`` table.
+@dataclass(frozen=True, eq=False)
+class TrialSignals:
+    """Motion and forces of a trial with N frames.
 
-    All coordinates are smoothed alike, so theirs have the same shape over time.
+    q (N, nq), v and a (N, nv). determined : (N,) frames whose pose the markers determine.
+    acceleration_noise : (N,) noise level of the pelvis' acceleration [m/s2]; all coordinates are
+    smoothed alike, so theirs have the same shape over time. wrench : (N, 6) on the body about the
+    world's origin. measured : (N,) frames with every contact on a plate. plates : by name, the
+    wrench (N, 6) of each.
     """
-    linear = frame[[f"sd_{name}" for name in skeleton.v_names[:3]]].to_numpy()
-    return np.sqrt((linear**2).mean(axis=1))
+
+    times_s: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    determined: np.ndarray
+    acceleration_noise: np.ndarray
+    wrench: np.ndarray
+    measured: np.ndarray
+    plates: Mapping[str, np.ndarray]
+
+    @property
+    def valid(self) -> np.ndarray:
+        """(N,) frames whose pose is determined and whose contacts are all measured."""
+        return self.determined & self.measured
+
+    @property
+    def rate_hz(self) -> float:
+        return rate_of(self.times_s)
+
+
+def signals_of(unit: Unit, person: Person, trial: Trial | None = None) -> TrialSignals:
+    """Of a trial, by default the unit's own, from its ``kinematics`` and ``wrench``."""
+    kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
+    linear = kinematics[[f"sd_{name}" for name in person.skeleton.v_names[:3]]].to_numpy()
+    return TrialSignals(
+        kinematics["time_s"].to_numpy(),
+        *coordinates_from(kinematics, person.skeleton),
+        kinematics["determined"].to_numpy(),
+        np.sqrt((linear**2).mean(axis=1)),
+        wrench[WRENCH].to_numpy(),
+        wrench["valid"].to_numpy(),
+        plate_wrenches(wrench),
+    )
+
+
+def plate_wrenches(wrench: pd.DataFrame) -> dict[str, np.ndarray]:
+    """By name, the readings (N, 6) of the plates in a ``wrench`` table."""
+    found = (re.fullmatch(r"plate(.*)_fx_N", str(column)) for column in wrench)
+    names = [one[1] for one in found if one]
+    return {name: wrench[[f"plate{name}_{c}" for c in WRENCH]].to_numpy() for name in names}
+
+
+def rate_of(times_s: np.ndarray) -> float:
+    """Frames per second [Hz]."""
+    return 1.0 / float(np.median(np.diff(times_s)))
+
+
+def columns(names: Sequence[str], values: np.ndarray) -> dict[str, np.ndarray]:
+    """An array (N, k) as the columns of a table, by name."""
+    return dict(zip(names, values.T, strict=True))
 
 
 def bsip_table(
@@ -83,11 +143,22 @@ def bsip_table(
 ) -> pd.DataFrame:
     """Rows of one method: values, standard deviations and data shares, each (n, 10)."""
     names = bsip_names()
-    table = pd.DataFrame({"method": method, "segment": list(segments)})
-    table[list(names)] = values
-    table[[f"{name}_sd" for name in names]] = sd
-    table[[share_name(name) for name in names]] = share
-    return table
+    table = {"method": method, "segment": list(segments)} | columns(names, values)
+    table |= columns([f"{name}_sd" for name in names], sd)
+    return pd.DataFrame(table | columns([share_name(name) for name in names], share))
+
+
+def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
+    """Methods and the parameters (10 n, k) of the segments with mass, about the joint centres."""
+    methods = list(dict.fromkeys(bsip["method"]))
+    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
+    bodies = []
+    for method in methods:
+        rows = bsip[bsip["method"] == method].set_index("segment")
+        rows = rows.loc[list(person.skeleton.body_names), list(bsip_names())].to_numpy()
+        pairs = zip(map(from_readable, rows), origins, strict=True)
+        bodies.append(np.concatenate([one.moved(-origin).phi() for one, origin in pairs]))
+    return methods, np.stack(bodies, axis=1)
 
 
 # --- the known loads of a trial, as parameters for science and in words for people ----------------

@@ -26,7 +26,7 @@ from bsip_cli.identification.problem import (
 )
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, spread_names
-from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, load_phi
+from bsip_cli.stages.frames import load_phi, signals_of
 from bsip_cli.study.study import Trial
 
 # Where the iteration of the weights begins: force plates and skin make errors of this size.
@@ -59,12 +59,6 @@ def spread_from(unit: Unit, spreads: np.ndarray, **other: float) -> Spread:
     return Spread(mass_sd_percent=spreads[:, 0], inertia_sd_percent=spreads[:, 4], **options)
 
 
-def usable_frames(unit: Unit, trial: Trial) -> np.ndarray:
-    """(N,) frames whose pose is determined and whose contacts are all measured."""
-    kinematics = unit.read("kinematics", trial)
-    return kinematics["determined"].to_numpy() & unit.read("wrench", trial)["valid"].to_numpy()
-
-
 def recordings_of(
     unit: Unit,
     person: Person,
@@ -77,28 +71,26 @@ def recordings_of(
     """
     recordings, blocks, options = [], [], unit.config.identify
     for trial in trials:
-        kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
-        times = kinematics["time_s"].to_numpy()
-        rate = 1.0 / float(np.median(np.diff(times)))
+        signals = signals_of(unit, person, trial)
+        times = signals.times_s
         # the blocks that are kept out are spread evenly over the trial
         share, block = options.hold_out_fraction, (times - times[0]) // options.block_s
         held_out = np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
-        use = usable_frames(unit, trial) & ~held_out
+        use = signals.valid & ~held_out
         if not use.any():
             unit.say(f"{trial.stem} has no frame with all contacts on plates; left out")
             continue
         for start, stop in valid_intervals(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
-        motion = coordinates_from(kinematics, person.skeleton)
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
+        motion, measured = (signals.q, signals.v, signals.a), np.nan_to_num(signals.wrench)
         if unit.loads(trial):
             phi = load_phi(unit, person, trial)[:, None]
             carried = predicted_wrench(pinocchio_model(person), *motion, phi, np.zeros(3))
             measured = measured - carried[..., 0]
         if changes and trial.stem in changes:
             measured = measured - changes[trial.stem]
-        level = acceleration_noise(kinematics, person.skeleton)
-        recordings.append(Recording(*motion, measured, use, rate, level))
+        level = signals.acceleration_noise
+        recordings.append(Recording(*motion, measured, use, signals.rate_hz, level))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
 
 

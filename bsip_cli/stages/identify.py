@@ -23,16 +23,23 @@ from bsip_cli.identification.problem import Estimate, Problem, Recording
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names, spread_names
 from bsip_cli.segments import in_words as segment_in_words
-from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
+from bsip_cli.stages.frames import (
+    WRENCH,
+    bsip_table,
+    load_phi,
+    load_words,
+    loads_record,
+    person_of,
+    signals_of,
+)
 from bsip_cli.stages.identification_problem import (
     duration_s,
     estimate_by,
     prior_from,
     problem_of,
     recordings_of,
-    usable_frames,
 )
-from bsip_cli.stages.trial_scene import motion_and_wrench_of
+from bsip_cli.stages.trial_scene import without_markers
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
@@ -45,9 +52,9 @@ def run(unit: Unit) -> None:
     skeleton = person.skeleton
     regression = unit.read("regression")
     prior = prior_from(unit, regression, person)
-    contacts = _external_contacts(unit, person, prior.phi)
+    contacts, frames = _external_contacts(unit, person, prior.phi)
     facts = {"external_contacts": {stem: asdict(one) for stem, one in contacts.items()}}
-    trials = _identification_trials(unit, contacts)
+    trials = _identification_trials(unit, contacts, frames)
     recordings, blocks = recordings_of(unit, person, trials)
     for trial in trials:
         known = load_words(unit, trial) if trial.stem in set(blocks["trial"]) else ""
@@ -77,7 +84,10 @@ def run(unit: Unit) -> None:
         found = uncertainty.readable(estimate, prior)
         shares[method] = found.share
         tables.append(bsip_table(method, skeleton.body_names, found.values, found.sd, found.share))
-    rarity = _rarity(unit, skeleton, problem, estimates)
+    rarity = {
+        method: _rarity(unit, problem, method, one, skeleton.body_names)
+        for method, one in estimates.items()
+    }
     made: dict = {"reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist()}
     made["loads"] = {trial.stem: loads_record(unit, trial) for trial in trials}
     unit.write("bsip", pd.concat(tables, ignore_index=True), made)
@@ -85,8 +95,16 @@ def run(unit: Unit) -> None:
     unit.write("base-parameters", _base_table(skeleton, problem))
     excited = uncertainty.excitation(problem)
     unit.write("excitation", _excitation_table(person, problem, excited, shares[OM]))
-    summary = _summary(problem, excited, estimates, estimators, blocks).assign(**rarity)
-    unit.write("identification", summary[column_names("identification")], facts)
+    of_all = {"trials": ", ".join(blocks["trial"].unique()), "rank": problem.basis.rank}
+    of_all["condition_number"] = excited.condition_number
+    summary = [
+        {"method": method, "estimator": estimators[method]}
+        | of_all
+        | _summary(problem, one)
+        | rarity[method]
+        for method, one in estimates.items()
+    ]
+    unit.write("identification", summary, facts)
     unit.write("used-blocks", blocks)
 
 
@@ -106,28 +124,34 @@ def _write_table_only(
 # --- which data -------------------------------------------------------------------------------
 
 
-def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, Support]:
-    """What bears part of the body off the plates, by trial; phi (10 n,) of the table."""
-    found = {}
+def _external_contacts(
+    unit: Unit, person: Person, phi: np.ndarray
+) -> tuple[dict[str, Support], dict[Trial, int]]:
+    """What bears part of the body off the plates, by trial; phi (10 n,) of the table. And how many
+    frames of each trial are valid."""
+    found, frames = {}, {}
     for trial in unit.trials("kinematics", "wrench"):
-        scene = slow(motion_and_wrench_of(unit, person, phi, trial))
-        if (support := support_of(scene)) is not None:
+        known = phi + load_phi(unit, person, trial)
+        scene = without_markers(signals_of(unit, person, trial), person, known)
+        frames[trial] = int(scene.valid.sum())
+        if (support := support_of(slow(scene))) is not None:
             found[trial.stem] = support
-    return found
+    return found, frames
 
 
-def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[Trial]:
-    """The trials with the role; without one, the trial with most valid frames. Never one with an
-    external contact: the body would be made to bear what the contact bears."""
-    ready = unit.trials("kinematics", "wrench")
+def _identification_trials(
+    unit: Unit, contacts: Mapping[str, Support], frames: Mapping[Trial, int]
+) -> list[Trial]:
+    """The trials with the role; without one, the trial with most valid ``frames``. Never one with
+    an external contact: the body would be made to bear what the contact bears."""
+    ready = list(frames)
     named = [trial for trial in ready if trial.role == "sequence"]
     chosen = [trial for trial in named if trial.stem not in contacts]
     if not chosen:
-        counts = {trial: int(usable_frames(unit, trial).sum()) for trial in ready}
-        measured = [trial for trial in ready if counts[trial] > 0]
+        measured = [trial for trial in ready if frames[trial] > 0]
         moving = [trial for trial in measured if trial.role != "static"] or measured
         free = [trial for trial in moving if trial.stem not in contacts]
-        chosen = [max(free, key=lambda trial: counts[trial])] if free else []
+        chosen = [max(free, key=lambda trial: frames[trial])] if free else []
     instead = ", ".join(trial.stem for trial in chosen)
     used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
     for trial in named or ready:
@@ -147,29 +171,26 @@ def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[
 
 
 def _rarity(
-    unit: Unit, skeleton: Skeleton, problem: Problem, estimates: dict[str, Estimate]
-) -> pd.DataFrame:
-    """Columns of ``identification``: whose body is rarer than people allow; RM+mass is the table's
-    body, for which its number stands."""
-    rows = []
-    for method, estimate in estimates.items():
-        if method == RM_MASS:
-            rows.append((np.nan, np.nan, False, ""))
-            continue
-        found = uncertainty.rarity_of(problem.prior, estimate)
-        kg, table_kg = estimate.phi[::10], problem.prior.phi[::10]
-        words = ", ".join(  # of the segments that make half of the distance
-            f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
-            f"distance from the table; {kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
-            for i in found.farthest()
+    unit: Unit, problem: Problem, method: str, estimate: Estimate, names: tuple[str, ...]
+) -> dict:
+    """Columns of ``identification``: whether its body is rarer than people allow; RM+mass is the
+    table's body, for which its number stands."""
+    if method == RM_MASS:
+        return {"distance": np.nan, "probability": np.nan, "rare": False, "farthest": ""}
+    found = uncertainty.rarity_of(problem.prior, estimate)
+    kg, table_kg = estimate.phi[::10], problem.prior.phi[::10]
+    words = ", ".join(  # of the segments that make half of the distance
+        f"the {segment_in_words(names[i])} ({100 * found.shares[i]:.0f} % of the "
+        f"distance from the table; {kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
+        for i in found.farthest()
+    )
+    if found.is_rare:
+        unit.say(
+            f"do not use {method}: a body like this is rarer than 1 in "
+            f"{1 / uncertainty.RARE:.0f} people, most by {words}"
         )
-        rows.append((found.distance, found.probability, found.is_rare, words))
-        if found.is_rare:
-            unit.say(
-                f"do not use {method}: a body like this is rarer than 1 in "
-                f"{1 / uncertainty.RARE:.0f} people, most by {words}"
-            )
-    return pd.DataFrame(rows, columns=["distance", "probability", "rare", "farthest"])
+    known = {"distance": found.distance, "probability": found.probability}
+    return known | {"rare": found.is_rare, "farthest": words}
 
 
 def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.DataFrame:
@@ -223,23 +244,13 @@ def _excitation_table(
     return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
-def _summary(
-    problem: Problem,
-    found: uncertainty.Excitation,
-    estimates: dict[str, Estimate],
-    estimators: dict[str, str],
-    blocks: pd.DataFrame,
-) -> pd.DataFrame:
-    names = [f"rms_{name}" for name in WRENCH]
+def _summary(problem: Problem, estimate: Estimate) -> dict:
+    """Columns of ``identification``: what it rests on, its mass, and what it leaves."""
     table_kg = float(problem.prior.phi[::10].sum())
-    equations, rows = problem.equations, []
-    of_all = {"samples": equations.samples, "duration_s": equations.duration_s}
-    of_all |= {"effective_samples": float(problem.noise.effective.sum())}
-    of_all |= {"rank": problem.basis.rank, "condition_number": found.condition_number}
-    for method, estimate in estimates.items():
-        row: dict = {"estimator": estimators[method], "method": method, "note": estimate.note}
-        row |= {"trials": ", ".join(blocks["trial"].unique())} | of_all
-        row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
-        row["mass_factor_sd"] = float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg
-        rows.append(row | dict(zip(names, estimate.residual_rms(problem), strict=True)))
-    return pd.DataFrame(rows)
+    equations = problem.equations
+    row: dict = {"samples": equations.samples, "duration_s": equations.duration_s}
+    row |= {"effective_samples": float(problem.noise.effective.sum()), "note": estimate.note}
+    row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
+    row["mass_factor_sd"] = float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg
+    names = [f"rms_{name}" for name in WRENCH]
+    return row | dict(zip(names, estimate.residual_rms(problem), strict=True))

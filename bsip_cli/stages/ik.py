@@ -16,7 +16,7 @@ from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import the_joint
-from bsip_cli.stages.frames import markers_from, ordered_markers, person_of
+from bsip_cli.stages.frames import columns, markers_from, ordered_markers, person_of, rate_of
 
 _MOST_SAID = 5  # of a trial's sentences about single markers
 
@@ -43,10 +43,10 @@ def run(unit: Unit) -> None:
     if evidence.any_corrected():
         poses, decided = _solved(unit, person, evidence.markers_m)
     known, angle_sd = _determined(unit, person, poses, decided)
-    rate = 1.0 / float(np.median(np.diff(times)))
     options = unit.config.smoothing.model_dump()
     options["robust_limit_m"] = unit.config.ik.robust_limit_m
-    motion = smooth_motion(person, poses.q, known, rate, markers=evidence.markers_m, **options)
+    markers, rate_hz = evidence.markers_m, rate_of(times)
+    motion = smooth_motion(person, poses.q, known, rate_hz, markers=markers, **options)
     facts = {"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()}
     unit.write("kinematics", _kinematics(times, angle_sd, poses, motion, person.skeleton), facts)
     names = np.tile(np.array(person.markers, dtype=object), len(times))
@@ -105,10 +105,9 @@ def _determined(
 def _kinematics(
     times: np.ndarray, angle_sd: np.ndarray, poses: Poses, motion: Motion, skeleton: Skeleton
 ) -> pd.DataFrame:
-    known = {"time_s": times, "determined": motion.inner, "marker_rms_m": poses.frame_rms_m()}
-    known |= {"angle_sd_rad": angle_sd, "cutoff_hz": motion.cutoff_hz}
-    tables = [pd.DataFrame(known)]
+    table = {"time_s": times, "determined": motion.inner, "marker_rms_m": poses.frame_rms_m()}
+    table |= {"angle_sd_rad": angle_sd, "cutoff_hz": motion.cutoff_hz}
     for prefix, values in (("q", motion.q), ("v", motion.v), ("a", motion.a), ("sd", motion.a_sd)):
         names = skeleton.q_names if prefix == "q" else skeleton.v_names
-        tables.append(pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names]))
-    return pd.concat(tables, axis=1)
+        table |= columns([f"{prefix}_{name}" for name in names], values)
+    return pd.DataFrame(table)

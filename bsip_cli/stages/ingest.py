@@ -34,7 +34,7 @@ from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
-from bsip_cli.stages.frames import WRENCH
+from bsip_cli.stages.frames import WRENCH, XYZ, columns
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
 from bsip_cli.stages.survey import opened, prefix_of, reading_of
 
@@ -72,8 +72,9 @@ def run(unit: Unit) -> None:
     facts = {"marker_set": marker_set.name} | rates
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
     loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
-    found = _contacts(unit, recording, filled.markers_m, segments, loads, about)
-    contacts, intervals, about_mass = found
+    contacts, intervals, about_mass = _contacts(
+        unit, recording, filled.markers_m, segments, loads, about
+    )
     table, tolerance = unit.person, unit.config.ingest.mass_tolerance_percent
     stated_otherwise = against_table(recording.stated, table.mass_kg, table.height_m, tolerance)
     why, taken = recording.forces_note, "took the markers alone; no frame is compared"
@@ -90,10 +91,10 @@ def run(unit: Unit) -> None:
     known = {"mass_stretches": [one.record() for one in intervals], "zeros": zeros}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
     corners = [
-        {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
+        {"plate": plate.name, "corner": k} | dict(zip(XYZ, corner, strict=True))
         for plate in recording.plates
         if plate.corners_m is not None
-        for k, (x, y, z) in enumerate(plate.corners_m)
+        for k, corner in enumerate(plate.corners_m, start=1)
     ]
     unit.write("plates", corners)
     unit.write("contacts", _contact_table(times, contacts))
@@ -195,16 +196,16 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
 
 def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) -> pd.DataFrame:
     labels = np.tile(np.array(names, dtype=object), len(times))
-    table = pd.DataFrame({"time_s": np.repeat(times, len(names)), "marker": labels})
-    table[["x_m", "y_m", "z_m"]] = filled.markers_m.reshape(-1, 3)
-    return table.assign(filled=filled.filled.ravel())
+    table = {"time_s": np.repeat(times, len(names)), "marker": labels}
+    table |= columns(XYZ, filled.markers_m.reshape(-1, 3))
+    return pd.DataFrame(table | {"filled": filled.filled.ravel()})
 
 
 def _wrench_table(times: np.ndarray, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
     total = wrench.total if len(wrench.names) else np.full((len(times), 6), np.nan)
-    table = {"time_s": times, **dict(zip(WRENCH, total.T, strict=True)), "valid": contacts.valid}
+    table = {"time_s": times} | columns(WRENCH, total) | {"valid": contacts.valid}
     for name, rows in zip(wrench.names, wrench.per_plate, strict=True):
-        table |= {f"plate{name}_{c}": row for c, row in zip(WRENCH, rows.T, strict=True)}
+        table |= columns([f"plate{name}_{c}" for c in WRENCH], rows)
     return pd.DataFrame(table)
 
 
@@ -213,5 +214,4 @@ def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:
     for side, name in (("l", "left"), ("r", "right")):
         table[f"{name}_on_ground"] = contacts.on_ground.get(side, nothing)
         table[f"{name}_on_plate"] = contacts.on_plate.get(side, nothing)
-    table["valid"] = contacts.valid
-    return pd.DataFrame(table)
+    return pd.DataFrame(table | {"valid": contacts.valid})

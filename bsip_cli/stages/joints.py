@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -34,31 +35,33 @@ from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words
 from bsip_cli.stages.frames import (
-    WRENCH,
-    acceleration_noise,
-    coordinates_from,
+    TrialSignals,
     load_phi,
     loads_record,
+    parameters_of,
     person_of,
+    signals_of,
 )
-from bsip_cli.stages.reconstruct import parameters_of
-from bsip_cli.stages.trial_scene import body_as_sized, causes_of, outline, plate_names, scene_of
+from bsip_cli.stages.trial_scene import causes_of, extended_models, outline
 from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
 _WEAK_PRIOR = 200.0  # rad/m, as in smoothing: an angle that errs by more is held by the prior
+_UNSEEN = "no markers show how the segment moves"
+_BORNE = "a hand or another segment bears part of the body"
 _HELD = "something that no plate measures may bear the person"
 Reasons = dict[str, np.ndarray]  # in words: (N, J) frames and joints that it leaves out
 _SHARED = "nothing shows what each of two hands bears of one load"
 _NO_POSE = "the markers do not determine the pose"
+_SIDES = {"l": "left", "r": "right"}
 _FIT = (SegmentInertia, Turned)  # effects with which the motion stays, or is turned as a whole
 
 
 def run(unit: Unit) -> None:
     """Read motion, plates, contacts and parameters; write joint-moments and joint-peaks."""
     person = person_of(unit)
-    trial, bsip = trial_of(unit, person), unit.read("bsip")
-    methods, phi = parameters_of(bsip, person)
+    trial = trial_of(unit, person)
+    methods, phi = parameters_of(unit.read("bsip"), person)
     spread = _spreads(unit, person, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
@@ -66,8 +69,9 @@ def run(unit: Unit) -> None:
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
-    tables = [_table(trial, methods, loads, trial.valid(reasons), noise)]
-    for method, its_loads, ok in _extended(unit, trial, bsip, spread, methods):
+    tables = [_table(trial, methods, loads, _left(reasons), noise)]
+    of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
+    for method, its_loads, ok in _extended(unit, trial, of_om):
         tables.append(_table(trial, [method], its_loads, ok, noise))
     table = pd.concat(tables, ignore_index=True)
     unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
@@ -79,31 +83,15 @@ def run(unit: Unit) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
-    """Motion, and plates with the feet, of one trial; frames N."""
+class _Trial(TrialSignals):
+    """A trial with its plates, and with the feet by side: points (N, k, 3), contacts (N,)."""
 
     person: Person
-    times_s: np.ndarray
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    determined: np.ndarray
-    measured: np.ndarray
-    pelvis_noise: np.ndarray
-    readings: tuple[Reading, ...]
+    readings: Mapping[str, Reading]
     feet_m: dict[str, np.ndarray]
     on_ground: dict[str, np.ndarray]
     on_plate: dict[str, np.ndarray]
     cutoff_hz: float
-    plates: tuple[str, ...]
-
-    @property
-    def rate_hz(self) -> float:
-        return 1.0 / float(np.median(np.diff(self.times_s)))
-
-    def valid(self, reasons: Reasons) -> np.ndarray:
-        """(N, J) joints that nothing leaves out."""
-        return ~np.logical_or.reduce(list(reasons.values()))
 
     def loads(self, phi: np.ndarray, touched: Mapping[str, Ground], spread: Spread) -> JointLoads:
         """Of bodies phi (P, k); their errors change no faster than what the low-pass leaves."""
@@ -111,8 +99,9 @@ class _Trial:
         motion = (self.q, self.v, self.a)
         return joint_loads(self.person, *motion, phi, touched, spread, every=every)
 
-    def ground(self, readings: Sequence[Reading]) -> tuple[FootForces, dict[str, Ground]]:
+    def ground(self, by_plate: Mapping[str, Reading]) -> tuple[FootForces, dict[str, Ground]]:
         """Each foot's wrench, and by segment with its noise after the low-pass."""
+        readings = tuple(by_plate.values())
         feet = foot_forces(readings, self.feet_m, self.on_ground, self.on_plate, self.rate_hz)
         left = np.sqrt(noise_left(self.rate_hz, self.cutoff_hz))
         on_feet = {}
@@ -132,26 +121,17 @@ class _Trial:
 
 def trial_of(unit: Unit, person: Person) -> _Trial:
     """Motion, plates and feet of the unit's trial."""
-    kinematics, contacts, wrench = (unit.read(k) for k in ("kinematics", "contacts", "wrench"))
-    coordinates = coordinates_from(kinematics, person.skeleton)
-    motion = segment_motion(pinocchio_model(person), *coordinates)
-    names, corners = {"l": "left", "r": "right"}, unit.read("plates")
+    signals, contacts = signals_of(unit, person), unit.read("contacts")
+    corners = unit.read("plates")
+    motion = segment_motion(pinocchio_model(person), signals.q, signals.v, signals.a)
     return _Trial(
-        person,
-        kinematics["time_s"].to_numpy(),
-        *coordinates,
-        kinematics["determined"].to_numpy(),
-        wrench["valid"].to_numpy(),
-        acceleration_noise(kinematics, person.skeleton),
-        tuple(
-            Reading(wrench[[f"plate{n}_{c}" for c in WRENCH]].to_numpy(), outline(corners, n))
-            for n in plate_names(wrench)
-        ),
-        {side: _foot_points(person, motion, side) for side in SIDES},
-        {side: contacts[f"{names[side]}_on_ground"].to_numpy() for side in SIDES},
-        {side: contacts[f"{names[side]}_on_plate"].to_numpy() for side in SIDES},
-        unit.config.joints.cutoff_hz,
-        plate_names(wrench),
+        **vars(signals),
+        person=person,
+        readings={n: Reading(one, outline(corners, n)) for n, one in signals.plates.items()},
+        feet_m={side: _foot_points(person, motion, side) for side in SIDES},
+        on_ground={s: contacts[f"{name}_on_ground"].to_numpy() for s, name in _SIDES.items()},
+        on_plate={s: contacts[f"{name}_on_plate"].to_numpy() for s, name in _SIDES.items()},
+        cutoff_hz=unit.config.joints.cutoff_hz,
     )
 
 
@@ -171,24 +151,27 @@ def _foot_points(person: Person, motion: SegmentMotion, side: str) -> np.ndarray
 
 def _reasons(unit: Unit, trial: _Trial, feet: FootForces) -> Reasons:
     """Why a joint's loads are not determined; J joints, all but the floating base."""
-    person, count = trial.person, len(trial.q)
-    joints = len(person.skeleton.joints) - 1
-    found = {_NO_POSE: np.tile(~trial.determined[:, None], joints)}
-    unseen = person.without_data()[1:]
-    found["no markers show how the segment moves"] = np.tile(unseen, (count, 1))
-    off_plate = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
+    skeleton, count = trial.person.skeleton, len(trial.q)
+    every, unseen = slice(None), np.flatnonzero(trial.person.without_data()[1:])
+    parts: list[tuple[str, Any, np.ndarray]]
+    parts = [(_NO_POSE, every, ~trial.determined), (_UNSEEN, unseen, np.ones(count, bool))]
     if trial.readings:
-        found[_HELD] = np.tile((~trial.measured & ~off_plate)[:, None], joints)
-    for side in SIDES:
-        legs = [i - 1 for i in person.skeleton.way(f"foot_{side}")]
-        for words, frames in feet.unknown[side].items():
-            found.setdefault(words, np.zeros((count, joints), bool))[:, legs] |= frames[:, None]
-    words = "a hand or another segment bears part of the body"
-    found[words] = np.zeros((count, joints), bool)
-    for segment, frames in _contacts(unit, trial):
-        on = [i - 1 for i in person.skeleton.way(segment)]
-        found[words][:, on] |= frames[:, None]
+        off_plate = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
+        parts.append((_HELD, every, ~trial.measured & ~off_plate))
+    of_feet = ((f"foot_{side}", *one) for side in SIDES for one in feet.unknown[side].items())
+    of_others = ((segment, _BORNE, frames) for segment, frames in _contacts(unit, trial))
+    for segment, words, frames in (*of_feet, *of_others):
+        parts.append((words, [i - 1 for i in skeleton.way(segment)], frames))
+    found: Reasons = {}
+    for words, joints, frames in parts:
+        out = found.setdefault(words, np.zeros((count, len(skeleton.joints) - 1), bool))
+        out[:, joints] |= frames[:, None]
     return found
+
+
+def _left(reasons: Reasons) -> np.ndarray:
+    """(N, J) joints that nothing leaves out."""
+    return ~np.logical_or.reduce(list(reasons.values()))
 
 
 def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
@@ -285,7 +268,7 @@ def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.nd
     signal = np.stack(each)
     if len(some) > 1:
         signal = interp1d(some, signal, axis=1)(near)
-    force, moment = signal * trial.pelvis_noise[:, None, None]
+    force, moment = signal * trial.acceleration_noise[:, None, None]
     return force, moment
 
 
@@ -305,23 +288,16 @@ def _columns(person: Person, q: np.ndarray) -> np.ndarray:
 
 
 def _extended(
-    unit: Unit, trial: _Trial, bsip: pd.DataFrame, spread: Spread, methods: Sequence[str]
+    unit: Unit, trial: _Trial, of_om: Spread
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
     """Method, loads and valid frames (N, J) of the extended models of this trial: forces freed of
     the errors of plates and clock, axes of their tilts; parameters as ``extend`` found them; what
     else a segment carries, as a ball in a hand, loads the joints on its way to the pelvis. OM's
     covariance stands for theirs: they come from the same data."""
-    causes, extended = causes_of(unit), unit.read("extended-bsip")
-    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
-    if not own or extended.empty:
+    models = extended_models(unit, trial.person)
+    if models is None:
         return
-    person = trial.person
-    names, phi = parameters_of(pd.concat([bsip, extended]), person)
-    scene = scene_of(unit, person, body_as_sized(unit, phi[:, names.index(RM)]))
-    known = load_phi(unit, person)
-    of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
-    for place, k in enumerate(own):
-        among = [causes[j] for j in own[: place + 1]]
+    for among, phi in models.steps:
         others = (one.effect for one in among if not one.effect.of_the_forces)
         fitting = (one.on_its_segment or isinstance(one, _FIT) for one in others)
         if not all(fitting):
@@ -329,19 +305,20 @@ def _extended(
             unit.say(f"no joint moments of {method_of(among)}: {why}")
             return
         forces = [one for one in among if one.effect.of_the_forces]
-        corrected = corrected_plates(replace(scene, valid=trial.measured), forces)
-        pairs = zip(trial.readings, trial.plates, strict=True)
-        freed = [replace(one, wrench=corrected.get(name, one.wrench)) for one, name in pairs]
+        corrected = corrected_plates(replace(models.scene, valid=trial.measured), forces)
+        freed = {
+            name: replace(one, wrench=corrected.get(name, one.wrench))
+            for name, one in trial.readings.items()
+        }
         feet, on_feet = trial.ground(freed)
         q, upright = in_true_axes(trial.q, on_feet, among)
-        touched = other_loads(replace(scene, q=q), upright, among)
-        body = phi[:, names.index(method_of(causes[: k + 1]))] + known
-        loads = replace(trial, q=q).loads(body[:, None], touched, of_om)
+        touched = other_loads(replace(models.scene, q=q), upright, among)
+        loads = replace(trial, q=q).loads(phi[:, None], touched, of_om)
         reasons = _reasons(unit, trial, feet)
-        reasons[_SHARED] = np.tile(sharing(person, among), (len(trial.q), 1))
+        reasons[_SHARED] = np.tile(sharing(trial.person, among), (len(trial.q), 1))
         if reasons[_SHARED].any():
             unit.say(f"{method_of(among)}: joint moments are left out: {_SHARED}")
-        yield method_of(among), loads, trial.valid(reasons)
+        yield method_of(among), loads, _left(reasons)
 
 
 def sharing(person: Person, causes: Sequence[Cause]) -> np.ndarray:
@@ -439,39 +416,34 @@ def _lowpassed(trial: _Trial, signals: np.ndarray, ok: np.ndarray) -> np.ndarray
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
     """``joint-peaks`` of ``joint-moments``: a row per method, joint and axis, how large, how sure,
     and what the method changes; ``left_out`` in words, by joint."""
-    starts = np.flatnonzero(moments["time_s"] == moments["time_s"].iloc[0])
-    names = ["method", "joint", "axis"]
-    keys = list(moments[names].iloc[starts].astype(str).itertuples(index=False, name=None))
-    time_s, moment, sd = (
-        moments[c].to_numpy().reshape(len(keys), -1)
-        for c in ("time_s", "moment_Nm", "moment_sd_Nm")
-    )
-    known = np.isfinite(moment)
-    at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]
-    time_s, peak, sd = (
-        np.where(known.any(axis=1), np.take_along_axis(x, at, axis=1)[:, 0], np.nan)
-        for x in (time_s, moment, sd)
-    )
-    methods = list(dict.fromkeys(method for method, *_ in keys))
-    rows = []
-    for k, (method, joint, axis) in enumerate(keys):
+    columns, names = ["time_s", "moment_Nm", "moment_sd_Nm"], ["method", "joint", "axis"]
+    groups = moments.groupby(names, sort=False, observed=True)
+    signals: dict[Any, np.ndarray] = {key: rows[columns].to_numpy() for key, rows in groups}
+    peaks = {key: _peak(signal) for key, signal in signals.items()}
+    methods, rows = list(dict.fromkeys(method for method, *_ in signals)), []
+    for (method, joint, axis), signal in signals.items():
         before = [m for m in methods[: methods.index(method)] if is_extended(m)]
         # RM; of an extended model the one with a cause less
         usual = OM if is_extended(method) else RM * (method != RM)
         other = before[-1] if is_extended(method) and before else usual
-        change = np.empty(0)
-        if other:
-            change = moment[k] - moment[keys.index((other, joint, axis))]
-            change = change[np.isfinite(change)]
-            alike = [n for n, key in enumerate(keys) if key[:2] == (other, joint)]
-            largest = np.abs(peak[alike]).max(initial=0.0, where=np.isfinite(peak[alike]))
+        time_s, peak, sd = peaks[method, joint, axis]
         row = {"method": method, "joint": joint, "axis": axis, "left_out": left_out[joint]}
-        row |= {"peak_Nm": peak[k], "peak_sd_Nm": sd[k], "peak_Nm_kg": peak[k] / mass_kg}
-        row |= {"peak_at_s": time_s[k], "frames": int(known[k].sum()), "compared_with": other}
+        row |= {"peak_Nm": peak, "peak_sd_Nm": sd, "peak_Nm_kg": peak / mass_kg}
+        row |= {"peak_at_s": time_s, "frames": int(np.isfinite(signal[:, 1]).sum())}
         row |= dict.fromkeys(("change_Nm", "change_rms_Nm", "change_percent"), np.nan)
+        row["compared_with"] = other
+        change = signal[:, 1] - signals[other, joint, axis][:, 1] if other else np.empty(0)
+        change = change[np.isfinite(change)]
         if len(change):
             most = change[np.abs(change).argmax()]
+            largest = np.nanmax([abs(peaks[k][1]) for k in peaks if k[:2] == (other, joint)])
             row |= {"change_Nm": most, "change_rms_Nm": np.sqrt((change**2).mean())}
             row["change_percent"] = 100 * abs(most) / largest
         rows.append(row)
     return table_of("joint-peaks", rows)
+
+
+def _peak(signal: np.ndarray) -> np.ndarray:
+    """The row (3,) of time, moment and standard deviation (N, 3) with the largest moment."""
+    known = signal[np.isfinite(signal[:, 1])]
+    return known[np.abs(known[:, 1]).argmax()] if len(known) else np.full(3, np.nan)

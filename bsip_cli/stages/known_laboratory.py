@@ -23,7 +23,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Number, Parameter
 from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.diagnose_trial import cause_record
+from bsip_cli.stages.trial_scene import cause_record
 from bsip_cli.statistics.samples import Z95
 
 _KEY = ("effect", "target", "parameter", "standing")

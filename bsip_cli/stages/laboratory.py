@@ -9,8 +9,8 @@ from typing import cast
 from zlib import crc32
 
 import numpy as np
-import pandas as pd
 
+from bsip_cli.artifacts import table_of
 from bsip_cli.diagnosis import laboratory_search
 from bsip_cli.diagnosis.findings import interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
@@ -27,8 +27,7 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.report.cohort.laboratory import named_sentences
 from bsip_cli.report.words import count
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import column_names
-from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, is_weighed, prior_of, stated_sd
+from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, prior_of, stated_sd
 from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.known_laboratory import information_in, pooled_rows
 from bsip_cli.stages.trial_scene import scene_of
@@ -38,6 +37,11 @@ _LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.
 _SAME_PLACE_M = 0.02  # of every corner: what laboratories meet of a plate not where it is said
 _MOVED = 0.1  # of its standard deviation: less makes no diagnosis untrue
 _UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
+_TEXTS = "effect target parameter unit verdict since sentence laboratory class_id scope who"
+_NUMBERS = "estimate ci_low ci_high probability limit"
+_NOTHING: dict = dict.fromkeys(_TEXTS.split(), "") | dict.fromkeys(_NUMBERS.split(), np.nan)
+_NOTHING |= {"persons": 0, "trials": 0}
+Found = laboratory_search.Verdict | laboratory_search.Deviation
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
 
 
@@ -73,7 +77,7 @@ def run_person(unit: Unit) -> None:
     if not sessions:
         why = "no trial has motion with every contact on a plate"
         unit.say(f"{why}; it shows nothing of the laboratory")
-    facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
+    facts = {"sessions": sessions, "mass_sd": stated_sd(unit)}
     unit.write("laboratory-information", rows, facts)
 
 
@@ -124,11 +128,12 @@ def run(unit: Unit) -> None:
     if not rows:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
-        rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
+        said = {"effect": "inconclusive", "verdict": "inconclusive", "sentence": sentence}
+        rows = [_NOTHING | said]
     numbered = enumerate(laboratories, start=1)
     persons = {str(k): {s.person: s.name for s in one} for k, one in numbered}
     facts = {"persons": persons, "answer": _answer(unit, found)}
-    table = pd.DataFrame(rows, columns=column_names("laboratory"))
+    table = table_of("laboratory", rows)
     for sentence in named_sentences(table):
         unit.warn(sentence)
     unit.write("laboratory", table, facts)
@@ -174,18 +179,18 @@ def _sessions(unit: Unit) -> Iterator[_Session]:
 
 def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
     """Sessions whose plates have the same names and places, the most first."""
+
+    def are_alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
+        near = (np.linalg.norm(a[k] - b[k], axis=1).max() < _SAME_PLACE_M for k in a if k in b)
+        return a.keys() == b.keys() and all(near)
+
     found: list[list[_Session]] = []
     for one in sessions:
-        mine = next((lab for lab in found if _alike(lab[0].plates, one.plates)), None)
+        mine = next((lab for lab in found if are_alike(lab[0].plates, one.plates)), None)
         if mine is None:
             found.append(mine := [])
         mine.append(one)
     return sorted(found, key=len, reverse=True)
-
-
-def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
-    near = (np.linalg.norm(a[k] - b[k], axis=1).max() < _SAME_PLACE_M for k in a if k in b)
-    return a.keys() == b.keys() and all(near)
 
 
 # --- rows ---------------------------------------------------------------------------------------
@@ -208,8 +213,8 @@ def _rows(
     rng = np.random.default_rng(crc32(unit.name.encode()))
     for one in laboratory_search.verdicts_of(lab, options.named_from, rng):
         counts = _counts(sessions, one.cause)
-        sentence = _sentence(one.cause, one.sizes, one.said, one.probability, counts)
-        cells = {"sentence": sentence, "laboratory": laboratory, "scope": "laboratory"}
+        cells = {"laboratory": laboratory, "scope": "laboratory"}
+        cells["sentence"] = _sentence(one, counts)
         yield from _rows_of(one, counts, cells)
     dates = mine.recorded_on
     dated = [(dates[s.name], k) for k, s in enumerate(sessions) if s.name in dates]
@@ -219,29 +224,21 @@ def _rows(
         them = [sessions[k] for k in deviation.sessions]
         who = them[0].name if len(them) == 1 else ""
         where = f"in {who}" if who else f"from {them[0].name} on"
-        what = f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}"
+        what = f"{where}, unlike the others: {_words(deviation)}"
         scope = "person" if deviation.cause.effect == STATED_MASS.name else "session"
         cells = {"since": "" if who else them[0].name, "sentence": what}
         cells |= {"laboratory": laboratory, "scope": scope, "who": who}
         yield from _rows_of(deviation, _counts(them, deviation.cause), cells)
 
 
-def _rows_of(
-    found: laboratory_search.Verdict, counts: tuple[int, int], cells: Mapping[str, str]
-) -> Iterator[dict]:
+def _rows_of(found: Found, counts: tuple[int, int], cells: Mapping[str, str]) -> Iterator[dict]:
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
+    of_all |= {"effect": found.cause.effect, "target": found.cause.target}
     for x in found.sizes:
-        size = {"estimate": x.value, "unit": x.parameter.unit, "ci_low": x.low, "ci_high": x.high}
-        key = found.cause.effect, found.cause.target, x.parameter.name
-        yield _row(key, limit=x.limit, **size, **of_all)
-
-
-def _row(key: tuple[str, str, str], **cells: object) -> dict:
-    texts = ("unit", "verdict", "since", "sentence", "laboratory", "class_id", "scope", "who")
-    numbers = ("estimate", "ci_low", "ci_high", "probability", "limit")
-    empty = dict.fromkeys(texts, "") | dict.fromkeys(numbers, np.nan) | {"persons": 0, "trials": 0}
-    return dict(zip(("effect", "target", "parameter"), key, strict=True)) | empty | cells
+        size = {"parameter": x.parameter.name, "estimate": x.value, "unit": x.parameter.unit}
+        size |= {"ci_low": x.low, "ci_high": x.high, "limit": x.limit}
+        yield _NOTHING | of_all | size
 
 
 def _counts(sessions: Sequence[_Session], cause: laboratory_search.Cause) -> tuple[int, int]:
@@ -267,35 +264,30 @@ def _effect(cause: laboratory_search.Cause) -> Effect:
     return STATED_MASS if cause.effect == STATED_MASS.name else EFFECTS[cause.effect]
 
 
-def _words(cause: laboratory_search.Cause, sizes: Sequence[laboratory_search.Size]) -> str:
-    known = [(x.parameter, x.value, x.low, x.high) for x in sizes]
-    numbers = tuple(Number(one.name, one.unit, *of) for one, *of in known)
-    values = np.array([one.value for one in sizes])
-    words = _effect(cause).words(_NO_SCENE, cause.target, values)
+def _words(found: Found) -> str:
+    numbers = tuple(
+        Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in found.sizes
+    )
+    values = np.array([one.value for one in numbers])
+    words = _effect(found.cause).words(_NO_SCENE, found.cause.target, values)
     return words.what + interval_words(numbers)
 
 
-def _sentence(
-    cause: laboratory_search.Cause,
-    sizes: Sequence[laboratory_search.Size],
-    said: str,
-    probability: float,
-    counts: tuple[int, int],
-) -> str:
-    words, remedy = _words(cause, sizes), _effect(cause).remedy
+def _sentence(found: laboratory_search.Verdict, counts: tuple[int, int]) -> str:
+    words, remedy = _words(found), _effect(found.cause).remedy
     shown = f"by {count(counts[0], 'person')} and {count(counts[1], 'recording')}"
     plain = {
         "named": f"{words}, {shown}; to make sure, {remedy}",
         "ambiguous": f"perhaps {words}, {shown}; other causes look alike here: {remedy}",
         "inconclusive": f"inconclusive: {words}; no possible size would have been named {shown}",
     }
-    if said in plain:
-        return plain[said]
-    best = min(sizes, key=lambda one: one.limit / one.parameter.typical)
+    if found.said in plain:
+        return plain[found.said]
+    best = min(found.sizes, key=lambda one: one.limit / one.parameter.typical)
     factor, unit = readable_unit(best.parameter.name, best.parameter.unit)
     limit = with_unit(f"{factor * best.limit:.{digits_of(factor * best.limit)}f}", unit)
-    start = "not so" if probability < 0.5 else "not sure"
+    start = "not so" if found.probability < 0.5 else "not sure"
     return (
-        f"{start}: {words}, probability {probability:.2g}; "
+        f"{start}: {words}, probability {found.probability:.2g}; "
         f"{best.parameter.name.replace('_', ' ')} {limit} would have been named {shown}"
     )

@@ -5,6 +5,7 @@ What extend shares: a trial's wrenches filtered, judged and tabulated alike.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from itertools import combinations
 
@@ -14,18 +15,23 @@ from scipy import sparse
 
 from bsip_cli.artifacts import table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.inertia import from_readable
-from bsip_cli.body.person import Person
 from bsip_cli.dynamics.ground_wrench import (
     anterior_and_right,
     centre_of_pressure,
     pinocchio_model,
     predicted_wrench,
 )
-from bsip_cli.dynamics.lowpass import lowpass_operator, valid_intervals
+from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import bsip_names
-from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
+from bsip_cli.stages.frames import (
+    WRENCH,
+    load_phi,
+    loads_record,
+    parameters_of,
+    person_of,
+    rate_of,
+    signals_of,
+)
 from bsip_cli.statistics.choice import BlockErrors, error_gain
 from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
@@ -33,35 +39,33 @@ from bsip_cli.statistics.methods import MEASURED, METHODS
 from bsip_cli.statistics.samples import effective_samples_of_pair
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+_COP = ("cop_ap", "cop_ml")
 _SHORTEST_HELD_OUT_S = 0.5
 
-Wrenches = dict[str, np.ndarray]  # method: (N, 6) about the world's origin [N, N m]
 Signals = dict[str, dict[str, np.ndarray]]  # method: component: (N,) [N, N m, m]
 
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and parameters; write reconstruction and its fit."""
     person = person_of(unit)
-    kinematics, measured = unit.read("kinematics"), unit.read("wrench")
-    judgement = judgement_of(unit, kinematics, measured)
+    signals = signals_of(unit, person)
+    judgement = judgement_of(unit, signals.times_s, signals.valid)
     if not judgement.judged.any():
         unit.say("no interval in which every contact is on a plate; nothing to judge")
     methods, phi = parameters_of(unit.read("bsip"), person)
     phi = phi + load_phi(unit, person)[:, None]  # known loads included
-    motion = coordinates_from(kinematics, person.skeleton)
+    motion = signals.q, signals.v, signals.a
     simulated = predicted_wrench(pinocchio_model(person), *motion, phi, np.zeros(3))
-    raw = {MEASURED: measured[WRENCH].to_numpy()}
+    raw = {MEASURED: signals.wrench}
     raw |= {name: simulated[..., k] for k, name in enumerate(methods)}
-    wrenches, signals = judgement.compared(raw)
-    rows = reconstruction_rows(judgement, wrenches, signals)
+    components = judgement.compared(raw)
+    rows = reconstruction_rows(judgement, components)
     unit.write("reconstruction", rows, facts={"loads": loads_record(unit)})
-    compared = over_the_same_frames(signals)
+    compared = over_the_same_frames(components, judgement.judged)
     unit.write("fit", fit_rows(judgement, compared))
-    unit.write("correlation-difference", _correlations(compared, judgement.judged))
-    rate = 1.0 / float(np.median(np.diff(judgement.times_s)))
-    spans = valid_intervals(judgement.judged)
+    unit.write("correlation-difference", _correlations(compared))
     sway = [
-        {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
+        {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], signals.rate_hz))
         for name, one in compared.items()
     ]
     unit.write("posturography", sway)
@@ -92,44 +96,43 @@ class Judgement:
     body_weight_N: float
     min_force_N: float
 
-    def compared(self, wrenches: Wrenches) -> tuple[Wrenches, Signals]:
-        """Low-passed inside the valid intervals, as they were outside; all judged components."""
-        smooth, signals = {}, {}
+    def compared(self, wrenches: Mapping[str, np.ndarray]) -> Signals:
+        """All judged components of wrenches (N, 6), which are low-passed inside the valid intervals
+        and as they were outside."""
+        signals: Signals = {}
         for name, wrench in wrenches.items():
-            smooth[name] = wrench.copy()
-            smooth[name][self.frames] = self.operator @ np.nan_to_num(wrench)
-            one = signals[name] = dict(zip(_COMPONENTS, smooth[name].T, strict=True))
-            cop = centre_of_pressure(smooth[name], self.surface_height_m, self.min_force_N)
+            smooth = wrench.copy()
+            smooth[self.frames] = self.operator @ np.nan_to_num(wrench)
+            one = signals[name] = dict(zip(_COMPONENTS, smooth.T, strict=True))
+            cop = centre_of_pressure(smooth, self.surface_height_m, self.min_force_N)
             one["cop_ap"], one["cop_ml"] = anterior_and_right(cop, self.anterior)
             one["grf_vertical"] = one["fz"]
-        return smooth, signals
+        return signals
 
 
-def over_the_same_frames(signals: Signals) -> Signals:
-    """The signals with centres of pressure only where the measured force and every method that is
-    compared have one: near take-off a newton decides whether there is one, and its error is large.
+def over_the_same_frames(signals: Signals, judged: np.ndarray) -> Signals:
+    """The signals in the frames (N,) that count, NaN elsewhere; centres of pressure only where the
+    measured force and every method that is compared have one: near take-off a newton decides
+    whether there is one, and its error is large.
     """
     compared = [signals[name] for name in (MEASURED, *METHODS) if name in signals]
-    known = np.isfinite([one["cop_ap"] for one in compared]).all(axis=0)
-    same = {}
-    for name, one in signals.items():
-        cop = {c: np.where(known, one[c], np.nan) for c in ("cop_ap", "cop_ml")}
-        same[name] = {**one, **cop}
-    return same
+    known = np.isfinite([one["cop_ap"] for one in compared]).all(axis=0) & judged
+    return {
+        name: {c: np.where(known if c in _COP else judged, x, np.nan) for c, x in one.items()}
+        for name, one in signals.items()
+    }
 
 
-def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -> Judgement:
-    """From the trial's ``kinematics`` and ``wrench``, its plates, the person and used-blocks."""
+def judgement_of(unit: Unit, times: np.ndarray, valid: np.ndarray) -> Judgement:
+    """Of the trial's frames (N,), from its plates, the person and used-blocks."""
     facts, options = unit.read("person").iloc[0], unit.config.reconstruct
-    times = kinematics["time_s"].to_numpy()
-    valid = measured["valid"].to_numpy() & kinematics["determined"].to_numpy()
     used, blocks = np.zeros(len(times), dtype=bool), unit.read("used-blocks")
     for row in blocks[blocks["trial"] == unit.own_trial.stem].itertuples():
         used |= (times >= row.start_s) & (times <= row.end_s)  # these helped to identify
     judged, data = valid & ~used, "held_out"
-    if used.any() and judged.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
+    rate = rate_of(times)
+    if used.any() and judged.sum() / rate < _SHORTEST_HELD_OUT_S:
         judged, data = valid, "identification"  # nothing else is left to judge by
-    rate = 1.0 / float(np.median(np.diff(times)))
     frames = (times, valid, used, judged, data, *lowpass_operator(valid, rate, options.cutoff_hz))
     weight, corners = facts["mass_kg"] * GRAVITY_M_S2, unit.read("plates")["z_m"].to_numpy()
     height_m = float(corners.mean()) if len(corners) else 0.0  # the floor: no outline is known
@@ -138,33 +141,18 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
     return Judgement(*frames, height_m, anterior, weight, least_N)
 
 
-def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
-    """Methods and the parameters (10 n, k) of the segments with mass, about the joint centres."""
-    methods = list(dict.fromkeys(bsip["method"]))
-    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
-    columns = []
-    for method in methods:
-        rows = bsip[bsip["method"] == method].set_index("segment")
-        rows = rows.loc[list(person.skeleton.body_names), list(bsip_names())].to_numpy()
-        pairs = zip(map(from_readable, rows), origins, strict=True)
-        columns.append(np.concatenate([one.moved(-origin).phi() for one, origin in pairs]))
-    return methods, np.stack(columns, axis=1)
-
-
 # --- tables ---------------------------------------------------------------------------------
 
 
-def reconstruction_rows(judgement: Judgement, wrenches: Wrenches, signals: Signals) -> pd.DataFrame:
+def reconstruction_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
     """Rows of ``reconstruction``, method by method."""
-    parts = []
-    for name, wrench in wrenches.items():
-        part = pd.DataFrame(wrench, columns=WRENCH)
-        part.insert(0, "time_s", judgement.times_s)
-        part.insert(1, "method", name)
-        part["cop_ap_m"], part["cop_ml_m"] = signals[name]["cop_ap"], signals[name]["cop_ml"]
-        part["valid"], part["used"] = judgement.valid, judgement.used
-        parts.append(part)
-    return pd.concat(parts, ignore_index=True)
+    named = dict(zip(WRENCH, _COMPONENTS, strict=True)) | {f"{c}_m": c for c in _COP}
+    used = {"valid": judgement.valid, "used": judgement.used}
+    parts = [
+        {"time_s": judgement.times_s, "method": name} | {c: one[k] for c, k in named.items()} | used
+        for name, one in signals.items()
+    ]
+    return pd.concat([pd.DataFrame(part) for part in parts], ignore_index=True)
 
 
 def scale_of(component: str) -> tuple[float, str]:
@@ -175,13 +163,13 @@ def scale_of(component: str) -> tuple[float, str]:
 
 
 def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
-    """Rows of ``fit``: every method of ``signals`` against the measured one."""
-    rows, spans = [], valid_intervals(judgement.judged)
+    """Rows of ``fit``: every method of ``signals``, in the judged frames, against the measured."""
+    rows = []
     for method, computed in signals.items():
         for component, values in computed.items() if method != MEASURED else ():
             scale, unit = scale_of(component)
             weight = judgement.body_weight_N if unit == "N" else None
-            fit = fit_measures(signals[MEASURED][component] * scale, values * scale, spans, weight)
+            fit = fit_measures(signals[MEASURED][component] * scale, values * scale, weight)
             known = {"method": method, "component": component, "unit": unit}
             rows.append(known | asdict(fit) | {"data": judgement.data})
     return table_of("fit", rows)
@@ -198,18 +186,17 @@ def gain_rows(errors: dict[str, BlockErrors], method: str, data: str, seed: int)
     return table_of("gain", rows)
 
 
-def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
+def _correlations(signals: Signals) -> list[dict]:
     rows = []
     methods = [name for name in signals if name != MEASURED]
-    spans = valid_intervals(judged)
     for a, b in combinations(methods, 2):
         for component in signals[MEASURED]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))
-            r_a, r_b, r_ab = (correlation(p, q, spans) for p, q in ((x, y), (x, z), (y, z)))
-            n = min(effective_samples_of_pair(x, y, spans), effective_samples_of_pair(x, z, spans))
+            r_a, r_b, r_ab = (correlation(p, q) for p, q in ((x, y), (x, z), (y, z)))
+            n = min(effective_samples_of_pair(x, y), effective_samples_of_pair(x, z))
             known: dict = {"component": component, "method_a": a, "method_b": b}
             known |= {"r_a": r_a, "r_b": r_b, "r_ab": r_ab, "n_effective": n}
-            one, other = williams_t(r_a, r_b, r_ab, n), fisher_z_difference(r_a, n, r_b, n)
+            one, other = williams_t(r_a, r_b, r_ab, n), fisher_z_difference(r_a, r_b, n)
             known |= {"williams_t": one.statistic, "df": one.df1, "williams_p": one.p_value}
             known |= {"fisher_z": other.statistic, "fisher_p": other.p_value}
             rows.append(known | {"reason": one.reason})

@@ -97,8 +97,8 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> re
         for name, kind in _TABLES.items()
     }
     for name in ("reconstruction", "fit"):
-        table = tables[name]
-        tables[name] = records.with_all_causes(table) if table is not None else None
+        if (table := tables[name]) is not None:
+            tables[name] = records.with_all_causes(table)
     return records.TrialRecord(trial.stem, trial.task, trial.role, **tables)
 
 
@@ -179,14 +179,17 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
+def _facts(unit: Unit, kind: str, participant: Participant) -> dict:
+    """Empty where the artifact is not there."""
+    there = unit.path(kind, participant=participant).exists()
+    return unit.facts(kind, participant=participant) if there else {}
+
+
 def _use(unit: Unit, participant: Participant) -> str:
     """As the person's own page says, or else as chosen; the table's where nothing was."""
-    if unit.path("report-files", participant=participant).exists():
-        facts = unit.facts("report-files", participant=participant)
-        if "use" in facts:
-            return str(facts["use"])
     choice = _read(unit, "choice", participant)
-    return str(choice["use"].iloc[0]) if len(choice) else RM
+    chosen = choice["use"].iloc[0] if len(choice) else RM
+    return str(_facts(unit, "report-files", participant).get("use", chosen))
 
 
 def _member(
@@ -200,30 +203,25 @@ def _member(
         kind: {name: rows[name].iloc[0] for name in cohort.SHOWN[kind]} if len(rows) else None
         for kind, rows in shown.items()
     }
-    searched, light = None, None
-    if unit.path("overall-diagnosis", participant=participant).exists():
-        facts = unit.facts("overall-diagnosis", participant=participant)
-        diagnosis = unit.read("overall-diagnosis", participant=participant)
+    searched = None
+    if facts := _facts(unit, "overall-diagnosis", participant):
+        diagnosis = _read(unit, "overall-diagnosis", participant)
         searched = cohort.searched(participant.id, diagnosis, facts)
-    if has_page := unit.path("report-files", participant=participant).exists():
-        light = Light(**unit.facts("report-files", participant=participant)["light"])
-    known = participant.id, first["person"], first["identification"], has_page
-    refusals = refusals_of(unit, participant)
-    return cohort.Member(*known, refusals, searched, use if errors else "", errors, light)
+    page, refusals = _facts(unit, "report-files", participant), refusals_of(unit, participant)
+    light = Light(**page["light"]) if page else None
+    known = participant.id, first["person"], first["identification"], bool(page), refusals, searched
+    return cohort.Member(*known, use if errors else "", errors, light)
 
 
 def _origins_of_all(unit: Unit) -> Iterator[records.Origin]:
     """Of all that is read; a participant's own facts are no options of the group, and what a
     diagnosis found has its section."""
     for kind in unit.stage.inputs:
-        if SCHEMAS[kind].level == "cohort":
-            if unit.has(kind):
-                yield origin_of(unit.path(kind), "")
-        else:
-            paths = {p.id: unit.path(kind, participant=p) for p in unit.study.participants}
-            for name, path in paths.items():
-                if path.exists():
-                    origin = origin_of(path, name)
-                    origin.options.pop("participant", None)
-                    found = kind in ("overall-diagnosis", "report-files")
-                    yield replace(origin, messages=()) if found else origin
+        of_all = SCHEMAS[kind].level == "cohort"
+        for one in (None,) if of_all else unit.study.participants:
+            path = unit.path(kind, participant=one)
+            if unit.has(kind) if of_all else path.exists():
+                origin = origin_of(path, one.id if one else "")
+                origin.options.pop("participant", None)
+                found = kind in ("overall-diagnosis", "report-files")
+                yield replace(origin, messages=()) if found else origin

@@ -18,7 +18,7 @@ from bsip_cli.motion.scaling import Refinement, ScalingOptions, TrialMarkers, re
 from bsip_cli.recordings.scene import Stature, stature
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words, without_side
-from bsip_cli.stages.frames import markers_from, ordered_markers
+from bsip_cli.stages.frames import XYZ, columns, markers_from, ordered_markers
 from bsip_cli.stages.person_mass import person_mass
 from bsip_cli.study.study import Trial
 
@@ -105,16 +105,15 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
     allowed = unit.config.scale.may_be_held
     skeleton = person.skeleton
     held = [skeleton.segments[i] for i in skeleton.bodies if person.held[i]]
-    lost = [name for name in held if without_side(name) not in allowed]
-    if not lost:
-        return
-    serve = [f"{marker_set.on(name) or 'some'} on the {in_words(name)}" for name in lost]
-    raise BadDataError(
-        f"no markers on the {', '.join(map(in_words, lost))}",
-        expected="; ".join(serve),
-        remedy="record these, or let the segment be held at the neutral pose: study.toml [scale] "
-        f"may_be_held = {json.dumps([*allowed, *dict.fromkeys(map(without_side, lost))])}",
-    )
+    if lost := [name for name in held if without_side(name) not in allowed]:
+        serve = [f"{marker_set.on(name) or 'some'} on the {in_words(name)}" for name in lost]
+        may_be_held = json.dumps([*allowed, *dict.fromkeys(map(without_side, lost))])
+        raise BadDataError(
+            f"no markers on the {', '.join(map(in_words, lost))}",
+            expected="; ".join(serve),
+            remedy="record these, or let the segment be held at the neutral pose: study.toml "
+            f"[scale] may_be_held = {may_be_held}",
+        )
 
 
 def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
@@ -191,13 +190,14 @@ def _refine(
         positions = ordered_markers(one.labels, one.positions[frames], calibration.person.markers)
         return TrialMarkers(one.times[frames], positions)
 
-    (number,) = (k for k, one in enumerate(recorded) if one is still)
     middle = (quiet.start + quiet.stop) // 2
     options = unit.config.scale
     standing, trials = in_order(still, slice(middle, middle + 1)), map(in_order, recorded)
     how = ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"}))
     ik = unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"})
-    return refine_over_trials(calibration, standing, number, trials, options.frames, how, ik)
+    return refine_over_trials(
+        calibration, standing, recorded.index(still), trials, options.frames, how, ik
+    )
 
 
 # --- what is written --------------------------------------------------------------------------
@@ -221,13 +221,12 @@ def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinemen
     moved = person.joint_positions_m() - first.joint_positions_m()
     table: dict = {"segment": list(skeleton.segments), "parent": parents}
     table |= {"joint": list(skeleton.joints), "joint_type": list(skeleton.joint_types)}
-    for name, values in (("joint", person.joint_in_parent_m), ("origin", person.origin_in_joint_m)):
-        table |= {f"{name}_{axis}_m": values[:, k] for k, axis in enumerate("xyz")}
+    table |= columns([f"joint_{name}" for name in XYZ], person.joint_in_parent_m)
+    table |= columns([f"origin_{name}" for name in XYZ], person.origin_in_joint_m)
     table |= {name: getattr(person, name) for name in ("parent_tilt_rad", "child_tilt_rad")}
     table |= {"length_m": person.lengths_m, "first_guess_m": first.lengths_m}
     table |= {"length_sd_m": fit.length_sd_m, "joint_shift_m": np.linalg.norm(moved, axis=1)}
-    table |= {"held": person.held}
-    return pd.DataFrame(table)
+    return pd.DataFrame(table | {"held": person.held})
 
 
 def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:
@@ -237,7 +236,7 @@ def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement)
     squares = np.where(seen, fit.poses.residual_m, 0.0) ** 2
     rms = np.sqrt(squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
     segments = [skeleton.segments[i] for i in person.marker_segments]
-    table = pd.DataFrame({"marker": list(person.markers), "segment": segments})
-    table[["x_m", "y_m", "z_m"]] = person.marker_positions_m
-    table["weight"], table["shift_m"] = person.marker_weights, np.linalg.norm(moved, axis=1)
-    return table.assign(residual_m=np.where(seen.any(axis=0), rms, np.nan))
+    table: dict = {"marker": list(person.markers), "segment": segments}
+    table |= columns(XYZ, person.marker_positions_m) | {"weight": person.marker_weights}
+    table |= {"shift_m": np.linalg.norm(moved, axis=1)}
+    return pd.DataFrame(table | {"residual_m": np.where(seen.any(axis=0), rms, np.nan)})

@@ -25,9 +25,10 @@ from bsip_cli.statistics.cohort import (
     PAIR,
     Comparison,
     Criteria,
-    PersonTestCounts,
+    PersonTests,
     Topic,
     Value,
+    counted,
     line_of,
     person_tests,
     tests_of,
@@ -64,7 +65,7 @@ class _Cohort:
         trials = (trial for person in unit.study.participants for trial in person.trials)
         self._has_sequences = any(trial.role == "sequence" for trial in trials)
         self._lines: dict[Topic, None] = {}
-        self._tests = PersonTestCounts()
+        self._tests: PersonTests = {}
         self._participants = 0
         self._fitted: dict[tuple[str, str, str], dict[str, int]] = defaultdict(
             lambda: {"identification": 0, "everyone": 0}
@@ -115,7 +116,8 @@ class _Cohort:
             self._lacks(f"{participant.id} has no identification trial", 2, 3, 6)
         runs = (run for recording in recordings for run in _correlations(recording))
         tests = person_tests(participant.id, runs)
-        self._tests.add(tests)
+        for test in tests:
+            test.add_to(self._tests)
         masses, centres = _of_parameters(participant, bsip) if bsip is not None else ([], [])
         of_trials = [value for recording in recordings for value in _of_recording(recording)]
         values = [*masses, *of_trials, *centres, *(v for test in tests for v in test.values())]
@@ -177,7 +179,7 @@ class _Cohort:
             rows = self._unit.read("values", table=[table], variable=[variable])
             tests += tests_of((Value(*row) for row in rows.itertuples(index=False)), criteria)
         tests.sort(key=lambda test: places[line_of(test.topic)])
-        found = with_holm([*tests, *self._tests.comparisons(criteria.alpha)])
+        found = with_holm([*tests, *counted(self._tests, criteria.alpha)])
         return [test.as_row() for test in found]
 
 

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Blocks, Cause
+from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
+from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.inverse_kinematics import marker_residuals
 from bsip_cli.recordings.plate_wrench import silent_frames
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, markers_from, ordered_markers
+from bsip_cli.stages.frames import (
+    XYZ,
+    TrialSignals,
+    load_phi,
+    markers_from,
+    ordered_markers,
+    parameters_of,
+    signals_of,
+)
+from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Trial
 
 _NAMED = ("named", "ambiguous")
@@ -31,8 +41,9 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     times, labels, positions = markers_from(unit.read("markers", trial))
     markers, events = ordered_markers(labels, positions, person.markers), "marker-events"
     markers = with_labels_corrected(markers, times, person.markers, unit.read(events, trial))
-    scene = motion_and_wrench_of(unit, person, phi, trial)
-    plates = plates_of(unit.read("plates", trial), unit.read("wrench", trial))
+    signals = signals_of(unit, person, trial)
+    scene = without_markers(signals, person, phi + load_phi(unit, person, trial))
+    plates = plates_of(unit.read("plates", trial), signals.plates)
     zeros = unit.facts("wrench", trial).get("zeros", {})
     rates = (unit.facts("markers", trial)[f"{what}_rate_hz"] for what in ("marker", "analog"))
     resampled = not np.isclose(*rates)
@@ -44,20 +55,10 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     return replace(scene, plates=plates, robust_limit_m=limit_m, residual_m=residual_m)
 
 
-def motion_and_wrench_of(
-    unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None
-) -> Scene:
-    """The same without single plates and without markers."""
-    kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
-    return Scene(
-        kinematics["time_s"].to_numpy(),
-        person,
-        *coordinates_from(kinematics, person.skeleton),
-        phi + load_phi(unit, person, trial),
-        plates=(),
-        valid=wrench["valid"].to_numpy() & kinematics["determined"].to_numpy(),
-        wrench=wrench[WRENCH].to_numpy(),
-    )
+def without_markers(signals: TrialSignals, person: Person, phi: np.ndarray) -> Scene:
+    """The same without single plates too; phi (10 n,) with known loads."""
+    motion = signals.times_s, person, signals.q, signals.v, signals.a
+    return Scene(*motion, phi, plates=(), valid=signals.valid, wrench=signals.wrench)
 
 
 def with_labels_corrected(
@@ -72,31 +73,24 @@ def with_labels_corrected(
     return found
 
 
-def plate_names(wrench: pd.DataFrame) -> tuple[str, ...]:
-    """Of the plates whose readings a ``wrench`` table holds."""
-    found = (re.fullmatch(r"(?:plate)?(.*)_fx_N", str(column)) for column in wrench)
-    return tuple(one[1] for one in found if one)
-
-
 def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:
     """(4, 3) corners of a plate in a ``plates`` table, if it has any."""
     rows = corners[corners["plate"].astype(str) == name].sort_values("corner")
-    return rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
+    return rows[XYZ].to_numpy() if len(rows) else None
 
 
-def plates_of(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
-    """Every plate that has a reading; where a file states no place, about its mean load."""
+def plates_of(corners: pd.DataFrame, readings: Mapping[str, np.ndarray]) -> tuple[Plate, ...]:
+    """Every plate that has a reading (N, 6); where a file states no place, about its mean load."""
     found = []
-    for number in plate_names(wrench):
-        reading = wrench[[f"plate{number}_{c}" for c in WRENCH]].to_numpy()
-        place = outline(corners, number)
+    for name, reading in readings.items():
+        place = outline(corners, name)
         loaded = np.nan_to_num(reading[:, 2]) > _LOADED_N
         if place is None and loaded.any():  # a square in the lab's axes about the mean load
             force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
             middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
             place = middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
         if place is not None:
-            found.append(Plate(number, place, reading))
+            found.append(Plate(name, place, reading))
     return tuple(found)
 
 
@@ -112,10 +106,55 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
     return tuple(Cause(*key, *both) for key, both in zip(keys, sizes, strict=True))
 
 
+def cause_record(
+    effect: str,
+    target: str,
+    trials: tuple[str, ...],
+    values: np.ndarray,
+    folds: list[list[float]] | None = None,
+    bounds: dict[str, float] | None = None,
+    verdict: str = "named",
+) -> dict:
+    """A cause for ``extend``; of the same sizes in every fold where ``folds`` says none."""
+    sizes = values.tolist()
+    known = {"effect": effect, "target": target, "trials": list(trials), "verdict": verdict}
+    return known | {"values": sizes, "folds": folds or [sizes] * FOLDS, "bounds": bounds or {}}
+
+
 def body_as_sized(unit: Unit, phi: np.ndarray) -> np.ndarray:
     """(10 n,) the body for which the causes were sized: RM's (10 n,), made as heavy as the
     plates read where the diagnosis believes them instead of the stated mass."""
     return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModels:
+    """Of a trial, OM with the causes that concern it, added one after the other.
+
+    scene : with the body for which the causes were sized. om : (10 n,) OM's parameters. steps : the
+    causes so far, and the parameters (10 n,) that were identified with them. Known loads are part
+    of all parameters.
+    """
+
+    scene: Scene
+    om: np.ndarray
+    steps: tuple[tuple[list[Cause], np.ndarray], ...]
+
+
+def extended_models(unit: Unit, person: Person) -> ExtendedModels | None:
+    """As ``extend`` found them; None where no cause concerns the trial, or OM is not known."""
+    causes, extended = causes_of(unit), unit.read("extended-bsip")
+    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
+    if not own or extended.empty:
+        return None
+    methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
+    body = dict(zip(methods, phi.T, strict=True))
+    scene, known = scene_of(unit, person, body_as_sized(unit, body[RM])), load_phi(unit, person)
+    steps = tuple(
+        ([causes[j] for j in own[: place + 1]], body[method_of(causes[: k + 1])] + known)
+        for place, k in enumerate(own)
+    )
+    return ExtendedModels(scene, body[OM] + known, steps)
 
 
 def blocks_of(unit: Unit, stem: str) -> Blocks:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.statistics.methods import OM, RM, RM_MASS, SAME_WITHIN
-from bsip_cli.statistics.samples import Intervals, effective_samples
+from bsip_cli.statistics.samples import effective_samples
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 PAIRS = ((OM, RM), (OM, RM_MASS), (RM_MASS, RM))
@@ -57,15 +57,15 @@ def between(logs: Sequence[float]) -> Difference:
     return Difference(float(np.mean(logs)), error * _widened(n))
 
 
-def within(first: np.ndarray, second: np.ndarray, intervals: Intervals) -> Difference:
-    """From one trial: residuals (N, components) of two methods, nan where there is none.
+def within(first: np.ndarray, second: np.ndarray) -> Difference:
+    """From one trial: residuals (N, components) of two methods, nan where none is judged.
 
     The mean logarithm of the RMSE is linearised in the squared residuals; its change over time is
     a series whose independent samples give the standard error.
     """
-    (log, slopes), (other_log, other_slopes) = (_log_error(r, intervals) for r in (first, second))
+    (log, slopes), (other_log, other_slopes) = map(_log_error, (first, second))
     series = slopes - other_slopes
-    n = effective_samples(series, intervals)
+    n = effective_samples(series)
     error = float(np.nanstd(series)) / np.sqrt(n)
     return Difference(log - other_log, error * _widened(n))
 
@@ -86,11 +86,9 @@ def _widened(n: float) -> float:
     return float(t.ppf(norm.cdf(1.0), n - 1)) if n > 1 else np.nan
 
 
-def _log_error(residuals: np.ndarray, intervals: Intervals) -> tuple[float, np.ndarray]:
-    """Mean logarithm of the RMSE, and how each frame (N,) moves it; nan outside the intervals."""
-    squares = np.full(residuals.shape, np.nan)
-    for start, stop in intervals:
-        squares[start:stop] = residuals[start:stop] ** 2
+def _log_error(residuals: np.ndarray) -> tuple[float, np.ndarray]:
+    """Mean logarithm of the RMSE, and how each frame (N,) moves it; nan where there is none."""
+    squares = residuals**2
     frames = int(np.isfinite(squares).any(axis=1).sum())
     counts = np.isfinite(squares).sum(axis=0)
     squares, counts = squares[:, counts > 0], counts[counts > 0]

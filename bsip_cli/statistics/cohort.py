@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from bsip_cli.statistics import samples
 from bsip_cli.statistics.hypothesis_tests import (
     cohens_d_pooled,
-    d_of_differences,
     described_pair,
     equivalence_tost,
     fisher_z_difference,
@@ -170,65 +169,45 @@ class Criteria:
 # --- OM against another method over the participants: the published t test, and what it lacks -----
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """(participants,) values x of OM and y of another method, in the topic's unit.
+def pair_tests(
+    topic: Topic, other: str, x: Sample, y: Sample, criteria: Criteria
+) -> Iterator[Comparison]:
+    """Of values (participants,) x of OM and y of another method.
 
-    ``origin`` : of the tests that the papers make of OM and RM; with other methods they are added.
+    Paired t test with Cohen's d as printed; d_z, and Wilcoxon's test; of masses, whether x and y
+    differ by less than so many percent of the mean of y; of errors, in how many participants each
+    method has the smaller one. What the papers test of OM and RM is added with other methods.
     """
+    table = topic.table
+    only_described = table == "table5" and not topic.variable.endswith("_rmse")
+    is_published = other == RM and (only_described or table in ("table1", "table2"))
+    of_pair: Origin = "published" if is_published else "added"
+    x, y = samples.finite_pairs(x, y)
 
-    topic: Topic
-    other: str
-    x: Sample
-    y: Sample
-    origin: Origin
+    def row(test: str, result: samples.TestResult, origin: Origin = "added", **more: Any) -> Any:
+        return Comparison(topic, test, origin, OM, other, **(vars(result) | more))
 
-    def row(self, test: str, origin: Origin, result: samples.TestResult, **more: Any) -> Comparison:
-        return Comparison(self.topic, test, origin, OM, self.other, **(vars(result) | more))
-
-
-def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[Pair]:
-    """OM with RM, and with each other method of which there are values."""
-    known = {value.method for value in values}
-    for other in ALTERNATIVES:
-        if other == RM or other in known:
-            x, y = per_participant(values, (OM, other)).T
-            yield Pair(topic, other, x, y, origin if other == RM else "added")
-
-
-def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
-    """Mean and SD of one method, without a test."""
-    x = samples.finite_values(per_participant(values, (method,))[:, 0])
-    found = {"n": len(x), "mean_a": samples.mean_of(x), "sd_a": samples.standard_deviation(x)}
-    return Comparison(topic, "description", "published", method, **found)  # type: ignore[arg-type]
-
-
-def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
-    """Paired t test with Cohen's d as printed; also d_z, and Wilcoxon's test."""
-    test = paired_t(pair.x, pair.y, 1.0 - alpha)
-    normality = samples.lilliefors_test(np.subtract(*samples.finite_pairs(pair.x, pair.y)))
-    more: dict[str, Any] = {"effect_size_name": f"Cohen's d (pooled SD, {pair.other} - OM)"}
+    if only_described:
+        yield row("description", described_pair(x, y), of_pair)
+        return
+    if table == "table3" and other == RM:
+        return  # that is one of the methods side by side
+    test = paired_t(x, y, 1.0 - criteria.alpha)
+    normality = samples.lilliefors_test(x - y)
+    more: dict[str, Any] = {"effect_size_name": f"Cohen's d (pooled SD, {other} - OM)"}
     more["effect_size"] = cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b)
     more |= {"lilliefors_p": normality.p_value, "reason": test.reason or normality.reason}
-    by_t = pair.row("paired_t", pair.origin, test, **more)
+    yield row("paired_t", test, of_pair, **more)
     d_z = samples.TestResult(n=test.n, difference=test.difference, reason=test.reason)
-    d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
-    ranks = wilcoxon(pair.x, pair.y)
-    by_rank = pair.row("wilcoxon", "added", ranks, effect_size_name="rank-biserial")
-    return by_t, pair.row("d_z", "added", d_z), by_rank
-
-
-def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
-    """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    other = samples.mean_of(samples.finite_pairs(pair.x, pair.y)[1])
-    bound = abs(other) * criteria.equivalence_percent / 100.0
-    return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
-
-
-def smaller_error(pair: Pair) -> Comparison:
-    """In how many participants each method has the smaller error, with the exact sign test."""
-    name = "share of participants in whom OM has the smaller error"
-    return pair.row("sign", "added", sign_test(pair.x, pair.y), effect_size_name=name)
+    d = nan if test.reason else float((x - y).mean() / (x - y).std(ddof=1))
+    yield row("d_z", d_z, effect_size=d, effect_size_name="d_z")
+    yield row("wilcoxon", wilcoxon(x, y), effect_size_name="rank-biserial")
+    if table == "table1":
+        bound = abs(samples.mean_of(y)) * criteria.equivalence_percent / 100.0
+        yield row("tost", equivalence_tost(x, y, bound, criteria.alpha))
+    elif table in ("table2", "table4", "table5"):
+        name = "share of participants in whom OM has the smaller error"
+        yield row("sign", sign_test(x, y), effect_size_name=name)
 
 
 # --- measured, OM and RM side by side: the published ANOVA of three groups, and the one for them --
@@ -246,32 +225,30 @@ def methods_compared(
     """
     table = table[np.isfinite(table).all(axis=1)]
     of_each = [samples.lilliefors_test(column) for column in table.T]
-    pairs = combinations(range(len(methods)), 2)
+    doubt = all_reasons(*(test.reason for test in of_each))
     differences = {
-        (i, j): samples.lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs
+        (i, j): samples.lilliefors_test(table[:, i] - table[:, j]).p_value
+        for i, j in combinations(range(len(methods)), 2)
     }
-    why = all_reasons(*(test.reason for test in of_each))
-    normality = [test.p_value for test in of_each]
-    between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
-    of_pairs = list(differences.values())
-    cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
-        ("one_way_anova", "t", "published", between, normality, why),
-        ("repeated_measures_anova", "paired_t", "added", within, of_pairs, ""),
-    )
-    for name, after, origin, (test, post_hoc), normal, doubt in cases:
-        numbers = vars(test) | {
-            "n": len(table),
-            "lilliefors_p": min((p for p in normal if not isnan(p)), default=nan),
-            "reason": test.reason or doubt,
-        }
-        yield Comparison(topic, name, origin, " / ".join(methods), **numbers)
+
+    def rows(name: str, after: str, origin: Origin, found: Any, normal: Iterable[float]) -> Any:
+        test, post_hoc = found
+        of_all = vars(test) | {"n": len(table)}
+        of_all["lilliefors_p"] = min((p for p in normal if not isnan(p)), default=nan)
+        of_all["reason"] = test.reason or doubt * (origin == "published")
+        yield Comparison(topic, name, origin, " / ".join(methods), **of_all)
         for (i, j), p in differences.items():
             means = described_pair(table[:, i], table[:, j])  # also where no test was possible
             numbers = vars(post_hoc.get((i, j), means.with_(reason=test.reason)))
-            of_means = {name: getattr(means, name) for name in _MEANS}
-            numbers = {**numbers, **of_means, "lilliefors_p": p}
+            numbers = numbers | {name: getattr(means, name) for name in _MEANS}
             pair = methods[i], methods[j]
-            yield Comparison(topic, f"bonferroni_{after}", origin, *pair, **numbers)
+            yield Comparison(topic, after, origin, *pair, **(numbers | {"lilliefors_p": p}))
+
+    between, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
+    own = [test.p_value for test in of_each]
+    yield from rows("one_way_anova", "bonferroni_t", "published", between, own)
+    names = "repeated_measures_anova", "bonferroni_paired_t"
+    yield from rows(*names, "added", within, differences.values())
 
 
 # --- which test belongs to which table ------------------------------------------------------------
@@ -280,26 +257,22 @@ def methods_compared(
 def tests_of(values: Iterable[Value], criteria: Criteria) -> Iterator[Comparison]:
     """Every test of the topics that these values belong to; all of a topic's must be there."""
     for topic, group in topics(v for v in values if v.method != PAIR).items():
-        table, alpha = topic.table, criteria.alpha
         is_share = topic.variable.endswith(DATA_SHARE)
         if is_share or all(value.method == DIFFERENCE for value in group):
-            yield description(topic, OM if is_share else DIFFERENCE, group)
+            method = OM if is_share else DIFFERENCE
+            x = samples.finite_values(per_participant(group, (method,))[:, 0])
+            mean, sd = samples.mean_of(x), samples.standard_deviation(x)
+            described = samples.TestResult(n=len(x), mean_a=mean, sd_a=sd)
+            yield Comparison(topic, "description", "published", method, **vars(described))
             continue
-        if table == "table3":  # the published groups; RM+mass, whose COP is RM's, is no fourth
+        if topic.table == "table3":  # RM+mass, whose COP is RM's, is no fourth group
             methods = (MEASURED, OM, RM)
-            yield from methods_compared(topic, per_participant(group, methods), methods, alpha)
-        only_described = table == "table5" and not topic.variable.endswith("_rmse")
-        is_published = table in ("table1", "table2") or only_described
-        for pair in pairs_of(topic, group, "published" if is_published else "added"):
-            if only_described:  # means and SDs
-                means = described_pair(*samples.finite_pairs(pair.x, pair.y))
-                yield pair.row("description", pair.origin, means)
-            elif table != "table3" or pair.other != RM:
-                yield from t_and_rank_tests(pair, alpha)
-                if table == "table1":
-                    yield equivalence(pair, criteria)
-                elif table in ("table2", "table4", "table5"):
-                    yield smaller_error(pair)
+            by_method = per_participant(group, methods)
+            yield from methods_compared(topic, by_method, methods, criteria.alpha)
+        there = {value.method for value in group}
+        for other in (one for one in ALTERNATIVES if one == RM or one in there):
+            x, y = per_participant(group, (OM, other)).T
+            yield from pair_tests(topic, other, x, y, criteria)
 
 
 # --- does OM follow the measured signal better than RM? One test per participant, then counts -----
@@ -313,6 +286,14 @@ class PersonTest:
     topic: Topic
     williams: samples.TestResult
     fisher: samples.TestResult
+
+    def add_to(self, tests: PersonTests) -> None:
+        """To those of the other participants."""
+        both: dict[Origin, tuple[str, samples.TestResult]]
+        both = {"added": ("williams_t", self.williams), "published": ("fisher_z", self.fisher)}
+        for origin, (name, found) in both.items():
+            numbers = found.statistic, found.p_value, found.reason
+            tests.setdefault((self.topic, name, origin), []).append(numbers)
 
     def values(self) -> tuple[Value, ...]:
         one, other = self.williams, self.fisher
@@ -344,46 +325,34 @@ def person_tests(
         *correlations, counts = zip(*known, strict=True)
         r_om, r_rm, r_om_rm = (float(np.mean(one)) for one in correlations)
         n = float(sum(counts))
-        williams, fisher = williams_t(r_om, r_rm, r_om_rm, n), fisher_z_difference(r_om, n, r_rm, n)
+        williams, fisher = (
+            williams_t(r_om, r_rm, r_om_rm, n),
+            fisher_z_difference(r_om, r_rm, n),
+        )
         tests.append(PersonTest(participant, topic, williams, fisher))
     return tuple(tests)
 
 
-class PersonTestCounts:
-    """What the participants' tests come to; keeps numbers of them, not the tests."""
+PersonTests = dict[tuple[Topic, str, Origin], list[tuple[float, float, str]]]
+"""By topic and test, the participants' statistics, p and reasons: numbers, not the tests."""
 
-    def __init__(self) -> None:
-        # statistic and p of each participant
-        self._numbers: dict[tuple[Topic, str, Origin], list[tuple[float, float]]]
-        self._numbers = defaultdict(list)
-        self._reasons: dict[tuple[Topic, str, Origin], set[str]] = defaultdict(set)
 
-    def add(self, tests: Iterable[PersonTest]) -> None:
-        for test in tests:
-            for name, origin, found in (
-                ("williams_t", "added", test.williams),
-                ("fisher_z", "published", test.fisher),
-            ):
-                key: Any = (test.topic, name, origin)
-                self._numbers[key].append((found.statistic, found.p_value))
-                self._reasons[key] |= {found.reason} if found.reason else set()
-
-    def comparisons(self, alpha: float) -> Iterator[Comparison]:
-        """Median t and p of each topic, and in how many participants OM or RM is better."""
-        for key, found in self._numbers.items():
-            numbers, reasons = np.array(found), self._reasons[key]
-            t, p = numbers[~np.isnan(numbers[:, 1])].T
-            better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
-            like = ", for instance" if len(reasons) > 1 else ""
-            concerned = f"in {len(numbers) - len(p)} of {len(numbers)} participants{like}"
-            yield Comparison(
-                *(*key, OM, RM),
-                n=len(p),
-                statistic=float(np.median(t)) if len(p) else nan,
-                p_value=float(np.median(p)) if len(p) else nan,
-                effect_size=(better + worse) / len(p) if len(p) else nan,
-                effect_size_name="share of participants whose correlations differ",
-                count_a=better,
-                count_b=worse,
-                reason=f"{concerned}: {min(reasons)}" if reasons else "",
-            )
+def counted(tests: PersonTests, alpha: float) -> Iterator[Comparison]:
+    """Median t and p of each topic, and in how many participants OM or RM is better."""
+    for key, found in tests.items():
+        t, p = np.array([one[:2] for one in found if not isnan(one[1])]).reshape(-1, 2).T
+        reasons = {reason for *_, reason in found if reason}
+        better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
+        like = ", for instance" if len(reasons) > 1 else ""
+        concerned = f"in {len(found) - len(p)} of {len(found)} participants{like}"
+        yield Comparison(
+            *(*key, OM, RM),
+            n=len(p),
+            statistic=float(np.median(t)) if len(p) else nan,
+            p_value=float(np.median(p)) if len(p) else nan,
+            effect_size=(better + worse) / len(p) if len(p) else nan,
+            effect_size_name="share of participants whose correlations differ",
+            count_a=better,
+            count_b=worse,
+            reason=f"{concerned}: {min(reasons)}" if reasons else "",
+        )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
+from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.statistics import samples
 
 ELLIPSE_SHARE = 0.95
@@ -38,10 +39,9 @@ class FitMeasures:
 def fit_measures(
     measured: ArrayLike,
     computed: ArrayLike,
-    intervals: samples.Intervals | None = None,
     body_weight_N: float | None = None,
 ) -> FitMeasures:
-    """RMSE, Pearson's r and the Sprague-Geers metric of two signals over the given intervals.
+    """RMSE, Pearson's r and the Sprague-Geers metric of two signals.
 
     With theta_ab the mean of a b: M = sqrt(theta_cc / theta_mm) - 1, P = arccos(theta_mc /
     sqrt(theta_mm theta_cc)) / pi, C = sqrt(M^2 + P^2) (Sprague and Geers, as in Schwer 2007,
@@ -50,13 +50,10 @@ def fit_measures(
     the phase.
 
     measured, computed : shape (n,), one unit. Rows in which either is not finite are left out.
-    intervals : half-open index pairs of the samples to compare, None for all.
     body_weight_N : mass times g; None if the signals are no forces.
-    ValueError: if the shapes differ or the intervals do not fit them.
+    ValueError: if the shapes differ.
     """
-    measured, computed = np.asarray(measured, dtype=float), np.asarray(computed, dtype=float)
-    parts = samples.finite_intervals(intervals, measured, computed)
-    m, c = samples.concatenated(measured, parts), samples.concatenated(computed, parts)
+    m, c = samples.finite_pairs(measured, computed)
     if len(m) == 0:
         return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
@@ -70,15 +67,13 @@ def fit_measures(
         angle = 2.0 * atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
         magnitude, phase = size_c / size_m - 1.0, angle / pi
     schwer = magnitude, phase, hypot(magnitude, phase)
-    n_effective = samples.effective_samples_of_pair(measured, computed, parts)
+    n_effective = samples.effective_samples_of_pair(measured, computed)
     return FitMeasures(rmse, percent, _pearson(m, c), *schwer, len(m), n_effective)
 
 
-def correlation(x: ArrayLike, y: ArrayLike, intervals: samples.Intervals | None = None) -> float:
+def correlation(x: ArrayLike, y: ArrayLike) -> float:
     """Pearson's r of two signals, as in `fit_measures`."""
-    first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    parts = samples.finite_intervals(intervals, first, second)
-    return _pearson(samples.concatenated(first, parts), samples.concatenated(second, parts))
+    return _pearson(*samples.finite_pairs(x, y))
 
 
 def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
@@ -97,7 +92,7 @@ class Posturography:
     rms_*_mm : root mean square about the mean, the usual definition of sway.
     rms_*_origin_m : about the origin of the coordinates, which only shows where the person
         stood; it is here because the printed values of Hansen 2017 fit it.
-    duration_s : time between first and last sample, summed over the intervals.
+    duration_s : time between first and last sample of each interval, summed.
     """
 
     rms_ap_mm: float = nan
@@ -111,12 +106,7 @@ class Posturography:
     n: int = 0
 
 
-def posturography(
-    cop_ap_m: ArrayLike,
-    cop_ml_m: ArrayLike,
-    rate_hz: float,
-    intervals: samples.Intervals | None = None,
-) -> Posturography:
+def posturography(cop_ap_m: ArrayLike, cop_ml_m: ArrayLike, rate_hz: float) -> Posturography:
     """RMS, mean velocity, path length and 95 % ellipse area of a centre of pressure.
 
     Path and time are summed within contiguous intervals only: no step across a gap. Mean
@@ -128,14 +118,13 @@ def posturography(
 
     cop_ap_m, cop_ml_m : shape (n,), in m. Samples in which either is not finite are gaps.
     rate_hz : samples per second.
-    intervals : half-open index pairs of the samples to use, None for all.
-    ValueError: if rate_hz is not positive, the shapes differ or the intervals do not fit them.
+    ValueError: if rate_hz is not positive or the shapes differ.
     """
     if not rate_hz > 0.0:
         raise ValueError(f"rate_hz must be positive, not {rate_hz}")
     ap, ml = np.asarray(cop_ap_m, dtype=float), np.asarray(cop_ml_m, dtype=float)
-    parts = samples.finite_intervals(intervals, ap, ml)
-    path = np.stack([samples.concatenated(ap, parts), samples.concatenated(ml, parts)])
+    path = np.stack(samples.finite_pairs(ap, ml))
+    parts = valid_intervals(np.isfinite(ap) & np.isfinite(ml))
     n = path.shape[1]
     if n == 0:
         return Posturography()

@@ -83,12 +83,6 @@ def _tested(found: TestResult, test: Any, interval: Any, p_value: float) -> Test
     return found.with_(**dict(zip(names, numbers, strict=True)))
 
 
-def d_of_differences(x: ArrayLike, y: ArrayLike) -> float:
-    """d_z, the mean of x - y over its SD; nan where the paired t test is not possible."""
-    x, y = finite_pairs(x, y)
-    return nan if _why_no_t(x, y) else float((x - y).mean() / (x - y).std(ddof=1))
-
-
 def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     """Wilcoxon's signed-rank test, two-sided, for differences that are not normal.
 
@@ -336,17 +330,17 @@ def williams_t(r_mc1: float, r_mc2: float, r_c1c2: float, n: float) -> TestResul
     return found.with_(statistic=t, df1=df, p_value=2.0 * float(stats.t.sf(abs(t), df)))
 
 
-def fisher_z_difference(r1: float, n1: float, r2: float, n2: float) -> TestResult:
-    """Test of two correlations from independent samples (Fisher 1921; Hansen 2014, 2.4); two-sided.
+def fisher_z_difference(r1: float, r2: float, n: float) -> TestResult:
+    """Test of two correlations, of n independent samples each, as if the samples of one were not
+    those of the other (Fisher 1921; Hansen 2014, 2.4); two-sided.
 
-    z = (atanh r1 - atanh r2) / sqrt(1/(n1 - 3) + 1/(n2 - 3)). For two correlations with the same
-    measured signal it is too timid: `williams_t` is the test for them.
+    z = (atanh r1 - atanh r2) / sqrt(2/(n - 3)). For two correlations with the same measured signal
+    it is too timid: `williams_t` is the test for them.
     """
     found = TestResult(difference=r1 - r2)
-    n = nan if isnan(n1) or isnan(n2) else min(n1, n2)
     if reason := _why_no_correlation(n, r1, r2):
         return found.with_(reason=reason)
-    z = (atanh(r1) - atanh(r2)) / sqrt(1.0 / (n1 - 3.0) + 1.0 / (n2 - 3.0))
+    z = (atanh(r1) - atanh(r2)) / sqrt(2.0 / (n - 3.0))
     return found.with_(statistic=z, p_value=2.0 * float(stats.norm.sf(abs(z))))
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import nan
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-
-from bsip_cli.dynamics.lowpass import valid_intervals
 
 # --- what a test gives ----------------------------------------------------------------------------
 
@@ -164,56 +161,13 @@ def mean_of(values: NDArray[np.float64]) -> float:
     return float(np.mean(values)) if len(values) else float("nan")
 
 
-# --- contiguous intervals of a sampled signal: half-open index pairs (start, stop) into it --------
-
-Intervals = Sequence[tuple[int, int]]
-"""(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
-
-
-def finite_intervals(
-    intervals: Intervals | None, *signals: NDArray[np.float64]
-) -> list[tuple[int, int]]:
-    """The given intervals, split where any of the signals is not finite.
-
-    intervals : half-open index pairs, or None for the whole signals.
-    signals : one or more arrays of the same shape (n,).
-    ValueError: if the signals differ in shape, or the intervals overlap, run backwards or leave the
-        signals: a mistake of the caller, not of the data.
-    """
-    n = len(signals[0])
-    if any(signal.shape != (n,) for signal in signals):
-        raise ValueError(f"signals must share one shape (n,): {[s.shape for s in signals]}")
-    ordered = sorted((int(start), int(stop)) for start, stop in intervals or [(0, n)])
-    if intervals is not None and len(intervals) == 0:
-        return []
-    for start, stop in ordered:
-        if not 0 <= start <= stop <= n:
-            raise ValueError(f"interval ({start}, {stop}) does not lie within 0..{n}")
-    for (_, stop), (start, _) in pairwise(ordered):
-        if start < stop:
-            raise ValueError(f"intervals overlap at sample {start}")
-    finite = np.logical_and.reduce([np.isfinite(signal) for signal in signals])
-    return [
-        (start + first, start + last)
-        for start, stop in ordered
-        for first, last in valid_intervals(finite[start:stop])
-    ]
-
-
-def concatenated(signal: NDArray[np.float64], intervals: Intervals) -> NDArray[np.float64]:
-    """The samples of all intervals, one after the other."""
-    if not intervals:
-        return signal[:0]
-    return np.concatenate([signal[start:stop] for start, stop in intervals])
-
-
 # --- how many independent samples an autocorrelated series is worth -------------------------------
 
 MINIMUM_SAMPLES = 4  # below this no autocorrelation can be estimated and the answer is nan
 WINDOW_PER_TIME = 5.0  # lags summed, in integrated correlation times (Sokal 1997, section 3)
 
 
-def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float:
+def effective_samples(x: ArrayLike) -> float:
     """Independent samples that would give the mean of x the same variance.
 
     n / (1 + 2 sum_k (N_k / n) rho_k), N_k the number of pairs of samples k apart, summed over
@@ -221,17 +175,15 @@ def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float
     Markov chain Monte Carlo, Statistical Science 7, section 3.3). The rule stops at the first
     negative swing of an oscillating series, so it counts rather too few samples than too many.
 
-    x : shape (n,), any unit. Samples that are not finite are gaps.
-    intervals : half-open index pairs to use, None for all. Positions count as time: pairs of
-        samples across a gap enter at their true lag.
+    x : shape (n,), any unit. Samples that are not finite are gaps: positions count as time, so
+        pairs of samples across a gap enter at their true lag.
     Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     series = np.asarray(x, dtype=float)
-    parts = finite_intervals(intervals, series)
-    samples = concatenated(series, parts)
+    samples = finite_values(series)
     if len(samples) < MINIMUM_SAMPLES or is_constant(samples):
         return float("nan")
-    products, _ = _lagged_products(series, parts)
+    products, _ = _lagged_products(series)
     share = products / products[0]  # (N_k / n) rho_k
     pairs = share[: len(share) // 2 * 2].reshape(-1, 2).sum(axis=1)
     negative = np.flatnonzero(pairs <= 0.0)
@@ -240,9 +192,7 @@ def effective_samples(x: ArrayLike, intervals: Intervals | None = None) -> float
     return len(samples) / correlation_time
 
 
-def effective_samples_of_pair(
-    x: ArrayLike, y: ArrayLike, intervals: Intervals | None = None
-) -> float:
+def effective_samples_of_pair(x: ArrayLike, y: ArrayLike) -> float:
     """Independent pairs that would give the correlation of x and y the same variance.
 
     n / (1 + 2 sum_k (N_k / n) rho_x,k rho_y,k), after Bartlett 1935 (Some aspects of the
@@ -252,16 +202,16 @@ def effective_samples_of_pair(
     for one series, this is not fooled by two oscillations that cross zero a frame apart.
 
     x, y : shape (n,), any units. Rows in which either is not finite are gaps.
-    intervals : as in `effective_samples`.
     Returns a float between 0 and n; nan for fewer than four samples or a constant series.
     """
     first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    parts = finite_intervals(intervals, first, second)
-    n = sum(stop - start for start, stop in parts)
-    if n < MINIMUM_SAMPLES or any(is_constant(concatenated(s, parts)) for s in (first, second)):
+    pairs = finite_pairs(first, second)
+    n = len(pairs[0])
+    if n < MINIMUM_SAMPLES or any(map(is_constant, pairs)):
         return float("nan")
-    products_x, counts = _lagged_products(first, parts)
-    products_y, _ = _lagged_products(second, parts)
+    gap = ~(np.isfinite(first) & np.isfinite(second))
+    products_x, counts = _lagged_products(np.where(gap, np.nan, first))
+    products_y, _ = _lagged_products(np.where(gap, np.nan, second))
     # (N_k / n) rho_x rho_y, each rho = (products_k / N_k) / (products_0 / n)
     share = (products_x / products_x[0]) * (products_y / products_y[0]) * n / np.maximum(counts, 1)
     times = 1.0 + 2.0 * np.cumsum(share[1:])
@@ -272,17 +222,14 @@ def effective_samples_of_pair(
 
 
 def _lagged_products(
-    series: NDArray[np.float64], intervals: Intervals
+    series: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum over all pairs k apart of the centred series, and the number of pairs, k = 0 .. n-1."""
-    first, last = intervals[0][0], intervals[-1][1]
-    present = np.zeros(last - first)
-    centred = np.zeros(last - first)
-    mean = concatenated(series, intervals).mean()
-    for start, stop in intervals:
-        present[start - first : stop - first] = 1.0
-        centred[start - first : stop - first] = series[start:stop] - mean
-    counts = np.round(_correlate_with_itself(present))
+    places = np.flatnonzero(np.isfinite(series))
+    inner = series[places[0] : places[-1] + 1]
+    present = np.isfinite(inner)
+    centred = np.where(present, inner - inner[present].mean(), 0.0)
+    counts = np.round(_correlate_with_itself(present.astype(float)))
     products = np.where(counts > 0, _correlate_with_itself(centred), 0.0)
     return products, counts
 

@@ -134,7 +134,6 @@ def test_the_fitted_side_does_not_know_the_simulator():
 def test_stages_do_not_know_each_other():
     """They meet in files."""
     helpers = {
-        "stages.diagnose_trial",
         "stages.frames",
         "stages.identification_problem",
         "stages.known_laboratory",

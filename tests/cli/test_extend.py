@@ -15,10 +15,8 @@ from bsip_cli.effects.loads import AddedMass
 from bsip_cli.pipeline import STAGES
 from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.stages.diagnose_trial import cause_record
-from bsip_cli.stages.frames import person_of
-from bsip_cli.stages.reconstruct import parameters_of
-from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.stages.frames import parameters_of, person_of
+from bsip_cli.stages.trial_scene import cause_record, scene_of
 from bsip_cli.statistics.methods import MEASURED, METHODS
 from tests.small_study import Run, small
 

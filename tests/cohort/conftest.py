@@ -183,7 +183,7 @@ def correlation(rng, component: str) -> dict:
     r = {"RM": 0.9 + rng.normal(0, 0.03), "OM": 0.97}
     a, b = ("RM", "OM") if component.startswith("f") else ("OM", "RM")
     r_ab, n = 0.93, rng.uniform(60, 200)
-    test, fisher = williams_t(r[a], r[b], r_ab, n), fisher_z_difference(r[a], n, r[b], n)
+    test, fisher = williams_t(r[a], r[b], r_ab, n), fisher_z_difference(r[a], r[b], n)
     return {
         "component": component,
         "method_a": a,

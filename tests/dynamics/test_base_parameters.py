@@ -52,7 +52,7 @@ def test_the_basis_reproduces_the_regressor_at_states_it_never_saw(model):
         [pin.integrate(model, pin.neutral(model), rng.normal(0, 1, 40)) for _ in range(10)]
     )
     v, a = rng.normal(0, 2, (10, 40)), rng.normal(0, 10, (10, 40))
-    Y = wrench_regressor(model, model.createData(), q, v, a, np.array([0.5, 1.0, 0.0]))
+    Y = wrench_regressor(model, q, v, a, np.array([0.5, 1.0, 0.0]))
     again = Y[..., basis.independent] @ basis.combine
     np.testing.assert_allclose(again, Y, rtol=0, atol=1e-8 * np.abs(Y).max())
     scale = np.linalg.norm(Y.reshape(-1, 150), axis=0)  # and column by column

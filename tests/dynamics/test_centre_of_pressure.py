@@ -59,9 +59,17 @@ def test_a_frame_without_one_methods_cop_is_compared_in_none():
             "RM+mass": signals([0.01, 0.3, 0.01]),
             "OM": signals([0.02, 0.4, 0.02]),
             "base": signals([0.02, 0.4, np.nan]),
-        }
+        },
+        np.ones(3, bool),
     )
     for method, errors in {"RM+mass": [0.01, np.nan, 0.01], "OM": [0.02, np.nan, 0.02]}.items():
         assert found[method]["cop_ap"] == pytest.approx(errors, nan_ok=True)
     assert np.isfinite(found["measured"]["cop_ml"]).tolist() == [True, False, True]
     assert found["OM"]["fz"].tolist() == [700.0, 210.0, 800.0]
+
+
+def test_what_is_not_judged_is_missing():
+    both = {name: signals([0.0, 0.1, 0.2]) for name in ("measured", "OM")}
+    found = over_the_same_frames(both, np.array([True, False, True]))
+    for one in found["OM"].values():
+        assert np.isfinite(one).tolist() == [True, False, True]

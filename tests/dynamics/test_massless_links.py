@@ -34,7 +34,7 @@ def test_parameters_are_those_of_the_fifteen():
     assert model.njoints - 1 == 17 and len(bodies_of(model)) == 15
     assert set(range(1, 18)) - set(bodies_of(model)) == {i + 1 for i in RODS}
     q, v, a = moving(GIRDLE, with_girdle().q)
-    rows = wrench_regressor(model, model.createData(), q, v, a, np.zeros(3))
+    rows = wrench_regressor(model, q, v, a, np.zeros(3))
     assert rows.shape == (len(q), 6, 150)
     inertias = regress(GIRDLE, "M", 72.0).inertias
     assert len(inertias) == 15 and sum(i.mass_kg for i in inertias) == pytest.approx(72.0)

@@ -29,7 +29,7 @@ from bsip_cli.running.session import run_session
 from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.study import inject_study, simulate_study
-from bsip_cli.stages.diagnose_trial import nothing, rows_of
+from bsip_cli.stages.diagnose import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
 from tests.small_study import small
 

@@ -81,7 +81,7 @@ def recording(duration_s: float, seed: int = 1, phi: np.ndarray | None = None) -
 def regressor(duration_s: float = 20.0, seed: int = 1, stride: int = 4) -> np.ndarray:
     """(n, 6, 150) rows of independent samples, unfiltered."""
     q, v, a = (x[::stride] for x in motion(duration_s, seed))
-    return wrench_regressor(world().model, world().model.createData(), q, v, a, np.zeros(3))
+    return wrench_regressor(world().model, q, v, a, np.zeros(3))
 
 
 def equations_of(rows: np.ndarray, measured: np.ndarray) -> NormalEquations:
@@ -132,7 +132,7 @@ def standing_still(samples: int) -> np.ndarray:
     """(n, 6, 150) rows of a person who does not move for a while."""
     q, v, a = motion(30.0)
     model = world().model
-    still = wrench_regressor(model, model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3))
+    still = wrench_regressor(model, q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3))
     return np.repeat(still, samples, axis=0)
 
 

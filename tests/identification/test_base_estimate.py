@@ -6,7 +6,6 @@ from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.identification.base import base_parameters, estimate
 from bsip_cli.identification.problem import (
     Problem,
-    ResidualSeries,
     accumulate,
     even_noise,
     noise_of,
@@ -72,7 +71,7 @@ def test_intervals_cover_the_truth_through_the_whole_chain():
     one = recording(30.0)
     operator, _ = lowpass_operator(one.use, 100.0, 8.0, 5)
     model = world().model
-    Y = wrench_regressor(model, model.createData(), one.q, one.v, one.a, np.zeros(3))
+    Y = wrench_regressor(model, one.q, one.v, one.a, np.zeros(3))
     rows = (operator @ Y.reshape(len(Y), -1)).reshape(-1, 6, 150)
     true = world().basis.combine @ world().phi_true
     rng = np.random.default_rng(3)
@@ -84,7 +83,7 @@ def test_intervals_cover_the_truth_through_the_whole_chain():
         equations = remeasured(motion_only, rows, measured)
         problem = Problem(equations, noise, world().prior, world().basis, 1.0)
         left = measured - rows @ estimate(problem).phi
-        noise = noise_of([ResidualSeries(left, np.ones(len(left)))])
+        noise = noise_of([(left, np.ones(len(left)))])
         fit = base_parameters(Problem(equations, noise, world().prior, world().basis, 1.0))
         hits.append(np.abs(fit.values - true) < 1.96 * np.sqrt(np.diag(fit.covariance)))
     assert 0.90 < np.mean(hits) < 0.98

@@ -7,7 +7,6 @@ from scipy import stats
 from bsip_cli.body.inertia import from_phi, from_readable
 from bsip_cli.dynamics.ground_wrench import predicted_wrench
 from bsip_cli.identification.consistent import (
-    Weights,
     are_physical,
     estimate,
     fit_at,
@@ -127,7 +126,7 @@ def test_the_spread_of_a_person_is_found():
         true = parameters(drawn(scale, rng))
         measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])
         fit = fit_with_weights(terms_of(problem_of(rows, measured, 1.0)))
-        spreads.append(1 / np.sqrt(fit.weights.spread))
+        spreads.append(1 / np.sqrt(fit.spread))
     assert spreads[0][1] < 0.7
     assert spreads[1][1] == pytest.approx(1.0)  # never wider than said
     assert spreads[0][0] < 0.8  # the masses, of which the data say little
@@ -146,12 +145,12 @@ def test_the_spreads_have_the_largest_evidence():
     fit = fit_with_weights(terms)
     for k in (0, 1):
         for factor in (0.25, 4.0):
-            spread = fit.weights.spread.copy()
+            spread = fit.spread.copy()
             spread[k] *= factor
-            other = fit_at(terms, Weights(spread, fit.weights.gamma))
+            other = fit_at(terms, spread, fit.gamma)
             assert other.evidence < fit.evidence
     for gamma in (0.03, 0.3, 3.0):
-        other = fit_at(terms, Weights(fit.weights.spread, gamma))
+        other = fit_at(terms, fit.spread, gamma)
         assert other.evidence <= fit.evidence + 1e-9
 
 

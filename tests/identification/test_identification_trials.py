@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-import pandas as pd
-
 from bsip_cli.stages.identify import _identification_trials
 from bsip_cli.study.study import Trial
 
@@ -16,22 +14,18 @@ HAND = "left hand stands still within 1 mm: something beside the plates bears it
 def chosen(contacts: tuple[str, ...], **frames: int) -> tuple[list[str], list[str]]:
     """Tasks that identify, and what is said, of trials with so many measured frames."""
     roles = {"static": "static", "sequence": "sequence"}
-    trials = tuple(
-        Trial("sub-01", task, f"sub-01_task-{task}", Path(task), roles.get(task, "validation"))
-        for task in frames
-    )
+    trials = {
+        Trial("sub-01", task, f"sub-01_task-{task}", Path(task), roles.get(task, "validation")): n
+        for task, n in frames.items()
+    }
     said: list[str] = []
     unit = SimpleNamespace(
         name="sub-01",
         say=lambda text: said.append(f"sub-01: {text}"),
-        trials=lambda *kinds: trials,
-        read=lambda kind, trial: pd.DataFrame(
-            {"determined": True, "valid": True}, index=range(frames[trial.task])
-        ),
         config=SimpleNamespace(identify=SimpleNamespace(hold_out_fraction=0.0)),
     )
     held = {f"sub-01_task-{task}": SimpleNamespace(words=lambda: HAND) for task in contacts}
-    return [trial.task for trial in _identification_trials(unit, held)], said
+    return [trial.task for trial in _identification_trials(unit, held, trials)], said
 
 
 def test_the_role_identifies_and_nothing_is_said():

@@ -10,7 +10,6 @@ from bsip_cli.errors import NumericalError
 from bsip_cli.identification.consistent import (
     BASIS,
     Objective,
-    Weights,
     are_physical,
     divergences,
     gradient,
@@ -29,7 +28,7 @@ from tests.identification.synthetic_identification import (
 
 def objective(problem, gamma=0.5):
     terms = terms_of(problem)
-    return objective_of(terms, Weights(np.ones(len(terms.spreads)), gamma))
+    return objective_of(terms, np.ones(len(terms.spreads)), gamma)
 
 
 def noisy(seed=1, samples=500, noise=3.0):

@@ -39,7 +39,7 @@ def rows_of(names: tuple[str, ...]) -> np.ndarray:
     for name in names:
         q, v, a = motion_of(BY_NAME[name], world().person, model)
         reference = np.append(q[:, :2].mean(axis=0), 0.0)
-        parts.append(wrench_regressor(model, model.createData(), q, v, a, reference))
+        parts.append(wrench_regressor(model, q, v, a, reference))
     return np.concatenate(parts)
 
 

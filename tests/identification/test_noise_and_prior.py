@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian
 from bsip_cli.identification.prior import prior_of
-from bsip_cli.identification.problem import Estimate, ResidualSeries, noise_of
+from bsip_cli.identification.problem import Estimate, noise_of
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import SPREAD, world
 
@@ -18,7 +18,7 @@ def ar1(a, count, seed):
 
 def even(residual):
     """As if the accelerations were equally noisy throughout."""
-    return ResidualSeries(residual, np.ones(len(residual)))
+    return residual, np.ones(len(residual))
 
 
 @pytest.mark.parametrize("a", [0.0, 0.5, 0.9])
@@ -56,7 +56,7 @@ def test_fast_frames_count_less():
     rng = np.random.default_rng(6)
     level = rng.uniform(0.1, 3.0, 8000)
     spread = np.sqrt(1.0 + 4.0 * level**2)
-    noise = noise_of([ResidualSeries(spread[:, None] * rng.normal(size=(8000, 6)), level)])
+    noise = noise_of([(spread[:, None] * rng.normal(size=(8000, 6)), level)])
     np.testing.assert_allclose(noise.steady, 1.0, rtol=0.25)
     np.testing.assert_allclose(noise.with_level, 2.0, rtol=0.1)
     weights = noise.weights_at(level)

@@ -24,7 +24,7 @@ def dense(one):
     """Filtered rows (n, 6, 150) and wrench (n, 6), all at once."""
     operator, _ = lowpass_operator(one.use, RATE_HZ, CUTOFF_HZ, STRIDE)
     model = world().model
-    Y = wrench_regressor(model, model.createData(), one.q, one.v, one.a, REFERENCE)
+    Y = wrench_regressor(model, one.q, one.v, one.a, REFERENCE)
     rows = (operator @ Y.reshape(len(Y), -1)).reshape(-1, 6, 150)
     return rows, operator @ moved(np.where(one.use[:, None], one.wrench, 0.0))
 

@@ -33,7 +33,7 @@ from bsip_cli.report.recordings import (
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import cause_line, cause_text, consequences
-from bsip_cli.stages.diagnose_trial import rows_of
+from bsip_cli.stages.diagnose import rows_of
 from tests.report.fake_study import Artifacts, diagnosis
 
 STATIC = "sub-01_task-static"

@@ -40,11 +40,11 @@ def test_against_the_formulas_of_the_notes():
     assert fit.n_effective == pytest.approx(500, rel=0.1)
 
 
-def test_only_finite_samples_of_the_intervals_count():
-    spoilt = SINE.copy()
-    spoilt[200:300] = 50.0
+def test_only_samples_that_are_finite_in_both_count():
+    spoilt, holed = SINE.copy(), SINE.copy()
+    spoilt[200:300], holed[200:300] = 50.0, np.nan
     spoilt[10] = np.nan
-    fit = fit_measures(SINE, spoilt, [(0, 200), (300, 1000)])
+    fit = fit_measures(holed, spoilt)
     assert (fit.n, fit.rmse) == (899, 0.0)
     assert np.isnan(fit.rmse_percent_bw)
 
@@ -120,14 +120,15 @@ def test_ellipse_holds_95_percent_of_normal_points():
 
 
 def test_no_path_and_no_time_across_a_gap():
-    ap = np.arange(10) * 1e-3
-    ap[5:] += 1.0  # a jump of a metre between the intervals
-    sway = posturography(ap, np.zeros(10), RATE_HZ, [(0, 5), (5, 10)])
+    ap = np.arange(11) * 1e-3
+    ap[6:] += 1.0  # a jump of a metre between the intervals
+    ap[5] = np.nan
+    sway = posturography(ap, np.zeros(11), RATE_HZ)
     assert sway.sway_length_mm == pytest.approx(8.0)
     assert sway.duration_s == pytest.approx(0.08)
     assert sway.mean_velocity_mm_s == pytest.approx(100.0)
-    ap[7] = np.nan
-    sway = posturography(ap, np.zeros(10), RATE_HZ, [(0, 5), (5, 10)])
+    ap[8] = np.nan
+    sway = posturography(ap, np.zeros(11), RATE_HZ)
     assert sway.sway_length_mm == pytest.approx(6.0)
     assert sway.n == 9
 

@@ -1,4 +1,4 @@
-"""Independent samples, intervals, normality, p values of several tests."""
+"""Independent samples, normality, p values of several tests."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,8 @@ from scipy.signal import lfilter
 
 from bsip_cli.statistics.samples import (
     adjusted_p_values,
-    concatenated,
     effective_samples,
     effective_samples_of_pair,
-    finite_intervals,
     lilliefors_test,
 )
 
@@ -55,47 +53,27 @@ def test_alternating_series_is_worth_no_more_than_its_length():
 
 def test_gaps_count_as_time():
     series = autoregressive([1.0, -0.9], N, 20, seed=6)
-    windows = [(i, i + 300) for i in range(0, N, 400)]
-    counted = np.mean([effective_samples(x, windows) for x in series])
+    series[:, np.arange(N) % 400 >= 300] = np.nan
+    counted = np.mean([effective_samples(x) for x in series])
     assert counted == pytest.approx(0.75 * N * 0.1 / 1.9, rel=0.12)
 
 
-def test_nan_is_a_gap():
-    (x,) = autoregressive([1.0, -0.9], N, 1, seed=7)
-    holed = x.copy()
-    holed[300:400] = np.nan
-    assert effective_samples(holed) == effective_samples(x, [(0, 300), (400, N)])
+def test_what_is_missing_at_the_ends_does_not_count():
+    x, y = autoregressive([1.0, -0.9], N, 2, seed=7)
+    longer = [np.concatenate([np.full(70, np.nan), one, np.full(30, np.inf)]) for one in (x, y)]
+    assert effective_samples(longer[0]) == effective_samples(x)
+    assert effective_samples_of_pair(*longer) == effective_samples_of_pair(x, y)
+
+
+def test_signals_of_different_length():
+    with pytest.raises(ValueError, match="shape"):
+        effective_samples_of_pair(np.zeros(6), np.zeros(5))
 
 
 @pytest.mark.parametrize("x", [[], [1.0, 2.0, 3.0], np.full(100, 0.1), np.full(9, np.nan)])
 def test_no_answer(x):
     assert np.isnan(effective_samples(x))
     assert np.isnan(effective_samples_of_pair(x, x))
-    assert np.isnan(effective_samples(np.arange(10.0), []))
-
-
-# --- intervals ------------------------------------------------------------------------------------
-
-
-def test_split_at_what_is_not_finite_and_keep_given_breaks():
-    x = np.array([0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
-    y = np.array([0.0, 1.0, 2.0, 3.0, np.inf, 5.0])
-    assert finite_intervals(None, x) == [(0, 2), (3, 6)]
-    assert finite_intervals([(3, 6), (0, 3)], x, y) == [(0, 2), (3, 4), (5, 6)]
-    assert finite_intervals([(0, 1), (1, 2)], x) == [(0, 1), (1, 2)]
-    assert finite_intervals([], x) == []
-    assert concatenated(x, [(0, 2), (5, 6)]).tolist() == [0.0, 1.0, 5.0]
-
-
-@pytest.mark.parametrize("intervals", [[(0, 7)], [(-1, 2)], [(3, 2)], [(0, 3), (2, 4)]])
-def test_intervals_that_do_not_fit(intervals):
-    with pytest.raises(ValueError, match="interval"):
-        finite_intervals(intervals, np.zeros(6))
-
-
-def test_signals_of_different_length():
-    with pytest.raises(ValueError, match="shape"):
-        finite_intervals(None, np.zeros(6), np.zeros(5))
 
 
 # --- normality and p values -----------------------------------------------------------------------

@@ -117,16 +117,14 @@ def load_paper(name: str) -> Paper:
 
 
 def _table(data: Mapping[str, Any]) -> PrintedTable:
-    methods, unit = tuple(data["methods"]), data.get("unit", "")
-    rows = tuple(_row(methods, {"unit": unit, **row}) for row in data["rows"])
+    methods, rows = tuple(data["methods"]), []
+    for printed in data["rows"]:
+        unit = printed.get("unit", data.get("unit", ""))
+        compare = printed.get("compare", printed.get("key", ""))
+        words = printed["name"], unit, compare, printed.get("error_of", "")
+        cells = {method: Cell.of(printed[method]) for method in methods if method in printed}
+        tests = {name: printed[name] for name in TESTS if name in printed}
+        rows.append(Row(*words, printed.get("ci", ""), cells, tests))
     exchanged = tuple((row, method) for row, method in data.get("exchanged", ()))
     head = data["number"], data["about"], methods
-    return PrintedTable(*head, rows, exchanged, data.get("fits_unit", ""))
-
-
-def _row(methods: tuple[str, ...], printed: Mapping[str, str]) -> Row:
-    compare = printed.get("compare", printed.get("key", ""))
-    words = printed["name"], printed["unit"], compare, printed.get("error_of", "")
-    cells = {method: Cell.of(printed[method]) for method in methods if method in printed}
-    tests = {name: printed[name] for name in TESTS if name in printed}
-    return Row(*words, printed.get("ci", ""), cells, tests)
+    return PrintedTable(*head, tuple(rows), exchanged, data.get("fits_unit", ""))

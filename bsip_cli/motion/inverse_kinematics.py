@@ -92,10 +92,11 @@ def solve_poses(
     iterations: int,
     may_show_nothing: bool = False,
 ) -> Poses:
-    """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
+    """Weighted least squares on all markers, robust beyond a limit.
 
     markers_m : (N, m, 3) world positions in the order of ``person.markers``, NaN where missing.
-    q_first : (nq,) where the first frame starts.
+    q_first : (nq,) where the first frame starts, each other one from the last; or (N, nq), where
+        each frame starts.
     marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik];
         ``posture_sd_rad`` may differ between coordinates (nv,).
 
@@ -104,7 +105,8 @@ def solve_poses(
     if not may_show_nothing and not np.isfinite(markers_m).any():
         raise BadDataError("no marker is visible in any frame", expected="tracked markers")
     count, nv = len(markers_m), len(person.skeleton.v_names)
-    q, residual = np.empty((count, len(q_first))), np.empty(markers_m.shape[:2])
+    starts = np.ascontiguousarray(np.atleast_2d(q_first))
+    q, residual = np.empty((count, starts.shape[1])), np.empty(markers_m.shape[:2])
     sd, steps = np.empty((count, nv)), np.empty(count, dtype=np.int64)
     task = kernel.Task(
         segments=np.asarray(person.marker_segments),
@@ -115,7 +117,7 @@ def solve_poses(
     )
     measured = np.ascontiguousarray(markers_m, dtype=float)
     tree = tree_of(person)
-    kernel.solve_frames(measured, q_first, tree, task, iterations, q, residual, sd, steps)
+    kernel.solve_frames(measured, starts, tree, task, iterations, q, residual, sd, steps)
     return Poses(q, residual, sd, steps >= 0)
 
 
@@ -134,12 +136,8 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
         return after
     earlier, options = markers_m[first - 1 :: -1], options | {"may_show_nothing": True}
     before = solve_poses(person, earlier, after.q[0], **options)
-    return concatenated([Poses(*(values[::-1] for values in vars(before).values())), after])
-
-
-def concatenated(parts: Sequence[Poses]) -> Poses:
-    """Poses of one after the other."""
-    return Poses(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
+    both = zip(vars(before).values(), vars(after).values(), strict=True)
+    return Poses(*(np.concatenate([one[::-1], other]) for one, other in both))
 
 
 def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
@@ -149,15 +147,12 @@ def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
     raised arms seen from hanging ones may end in a wrong optimum. ``options`` as in
     :func:`solve_poses`. Hinge angles come back within half a turn of zero.
     """
-    rng = np.random.default_rng(_STARTS)
-    best, least = neutral(person), np.inf
-    for k in range(_STARTS):
-        turns = rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)) if k else None
-        placed = place_base(person, markers_m, neutral(person, turns))
-        poses = solve_poses(person, markers_m[None], placed, **options)
-        misfit = float(np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2))
-        if misfit < least:
-            best, least = poses.q[0], misfit
+    rng, nv = np.random.default_rng(_STARTS), len(person.skeleton.v_names)
+    turns = [None, *rng.normal(0.0, _START_SD_RAD, (_STARTS - 1, nv))]
+    starts = np.array([place_base(person, markers_m, neutral(person, one)) for one in turns])
+    poses = solve_poses(person, np.tile(markers_m, (_STARTS, 1, 1)), starts, **options)
+    misfits = np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2, axis=1)
+    best = poses.q[np.argmin(misfits)]
     joints = zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True)
     hinges = [at for at, kind in joints if kind == "revolute"]
     best[hinges] = (best[hinges] + np.pi) % (2 * np.pi) - np.pi

@@ -16,7 +16,6 @@ from bsip_cli.motion.calibration import Calibration
 from bsip_cli.motion.inverse_kinematics import (
     Posed,
     Poses,
-    concatenated,
     marker_trust,
     posed,
     solve_poses,
@@ -80,7 +79,8 @@ def refine(
     parameters = tuple(_parameters(person, options))
     precision = _prior_precision(person, parameters, options)
     x = np.zeros(len(parameters))
-    fitted, poses = person, _poses(person, markers_m, q, ik)
+    # each frame from its own start: the chosen frames are not neighbours
+    fitted, poses = person, solve_poses(person, markers_m, q, **ik)
     before, cost = poses.rms_m(), _total_cost(poses, fitted, x, precision, options, ik)
     damping = 1e-6
     information, gradient = _reduced_equations(fitted, markers_m, poses, parameters, options, ik)
@@ -90,7 +90,7 @@ def refine(
             hessian + damping * np.diag(np.diag(hessian)), gradient - precision @ x
         )
         trial = _with(person, parameters, x + step)
-        trial_poses = _poses(trial, markers_m, poses.q, ik)
+        trial_poses = solve_poses(trial, markers_m, poses.q, **ik)
         trial_cost = _total_cost(trial_poses, trial, x + step, precision, options, ik)
         if trial_cost > cost:
             damping = max(100 * damping, 1e-3)
@@ -124,12 +124,6 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.linalg.norm(features - features[chosen[-1]], axis=1))
     return np.array(sorted(chosen))
-
-
-def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
-    """Each frame from its own start: the chosen frames are not neighbours."""
-    parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
-    return concatenated(parts)
 
 
 def _total_cost(poses, person, x, precision, options, ik) -> float:

@@ -30,10 +30,9 @@ from bsip_cli.config import load_config
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import (
     Poses,
-    model_markers,
+    posed,
     solve_poses,
     subtrees,
-    tree_of,
 )
 from bsip_cli.motion.smoothing import smooth_motion
 from tests.body.standing_person import joint_frames, random_poses
@@ -180,13 +179,14 @@ def pinocchio_loop(person: Person, markers_m: np.ndarray, q_first: np.ndarray) -
 def forward_difference(person: Person, count: int) -> float:
     """Largest difference [1 and m] of forward kinematics to Pinocchio's at random poses."""
     q = random_poses(person, count, 1.0, seed=3)
-    pairs = zip(tree_of(person).forward(q), joint_frames(person, q), strict=True)
+    at = posed(person, q)
+    pairs = zip((at.R, at.p), joint_frames(person, q), strict=True)
     return max(float(np.abs(ours - theirs).max()) for ours, theirs in pairs)
 
 
 def rms_of(person: Person, q: np.ndarray, markers_m: np.ndarray) -> np.ndarray:
     """(N,) marker RMS [m] of given poses."""
-    apart = markers_m - model_markers(person, *tree_of(person).forward(q))
+    apart = markers_m - posed(person, q).markers_m
     return np.sqrt((apart**2).sum(axis=2).mean(axis=1))
 
 

@@ -14,7 +14,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.calibration import calibrate
-from bsip_cli.motion.inverse_kinematics import model_markers, neutral, tree_of
+from bsip_cli.motion.inverse_kinematics import neutral, posed
 from bsip_cli.recordings.read import read_recording
 
 _STATIC = ROOT / "sample_data" / "sub-01" / "sub-01_task-static.c3d"
@@ -79,5 +79,5 @@ def movement(
 
 def noisy_markers(person: Person, q: np.ndarray, noise_m: float, seed: int = 2) -> np.ndarray:
     """(N, m, 3) markers of the poses with white noise per axis."""
-    markers = model_markers(person, *tree_of(person).forward(q))
+    markers = posed(person, q).markers_m
     return markers + np.random.default_rng(seed).normal(0, noise_m, markers.shape)

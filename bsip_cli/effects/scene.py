@@ -23,9 +23,7 @@ from bsip_cli.dynamics.segment_motion import UP, Point, SegmentMotion, segment_m
 from bsip_cli.motion.inverse_kinematics import (
     PoseResponse,
     marker_trust,
-    model_markers,
-    pose_responses,
-    tree_of,
+    posed,
 )
 
 if TYPE_CHECKING:
@@ -209,7 +207,7 @@ class Scene:
         The trust is smoothed, lest a marker that comes and goes shake the answer.
         """
         trust = gaussian_filter1d(self.trust, TRUST_S * self.rate_hz, axis=0, mode="nearest")
-        return pose_responses(self.person, self.q, trust)
+        return PoseResponse(self.person, self.q, trust * self.person.marker_weights)
 
     @cached_property
     def markers_m(self) -> np.ndarray:
@@ -223,7 +221,7 @@ class Scene:
     @cached_property
     def model_markers_m(self) -> np.ndarray:
         """(N, m, 3) where the pose puts the markers, world."""
-        return model_markers(self.person, *tree_of(self.person).forward(self.q))
+        return posed(self.person, self.q).markers_m
 
     @cached_property
     def _kept(self) -> dict[Hashable, Any]:

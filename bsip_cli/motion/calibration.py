@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.anthropometry import mean_length_m, stature_m
 from bsip_cli.body.joint_centres import JointCentres, hip_centres, joint_centres, unit, with_skin
-from bsip_cli.body.markersets import MarkerSet
+from bsip_cli.body.markersets import Marker, MarkerSet
 from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
@@ -58,11 +58,9 @@ def calibrate(
     landmarks |= moved
     guess = height_m or _rough_stature(landmarks)
     centres = joint_centres(landmarks, sex, guess)
-    p = centres.positions
-    lengths = {"torso": float(np.linalg.norm(p["neck"] - p["waist"]))}
-    for row, a, b in (("thigh", "hip", "knee"), ("shank", "knee", "ankle")):
-        both = [np.linalg.norm(p[f"{a}_{s}"] - p[f"{b}_{s}"]) for s in "lr"]
-        lengths[row] = float(np.mean(both))
+    lengths = {"torso": _joint_to_joint(centres, "torso", "")}
+    for row in ("thigh", "shank"):
+        lengths[row] = float(np.mean([_joint_to_joint(centres, row, side) for side in "lr"]))
     stature = height_m or stature_m(sex, lengths)
     frames = _frames(skeleton, centres, landmarks)
     person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
@@ -144,38 +142,37 @@ def _y_first(y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks) -> Person:
-    n = len(skeleton.segments)
     joints = dict(centres.positions) | {"root": centres.positions["waist"]}
-    in_parent, origin = np.zeros((n, 3)), np.zeros((n, 3))
-    parent_tilt, child_tilt = np.zeros(n), np.zeros(n)
-    for i, name in enumerate(skeleton.segments):
-        start, axes = frames[name]
-        joint = joints[skeleton.joints[i]]
-        origin[i] = axes.T @ (start - joint)
-        if skeleton.parents[i] < 0:
-            continue
-        parent_start, parent_axes = frames[skeleton.segments[skeleton.parents[i]]]
+    placed = [
+        (*frames[name], joints[joint])
+        for name, joint in zip(skeleton.segments, skeleton.joints, strict=True)
+    ]
+    origin = np.array([axes.T @ (start - joint) for start, axes, joint in placed])
+    in_parent = np.zeros_like(origin)
+    tilts = np.zeros((2, len(placed)))  # of hinges, as parent and child see them
+    for i, parent in enumerate(skeleton.parents[1:], start=1):
+        (parent_start, parent_axes, _), (_, axes, joint) = placed[parent], placed[i]
         in_parent[i] = parent_axes.T @ (joint - parent_start)
         if skeleton.joint_types[i] == "revolute":
-            hinge = centres.hinges[skeleton.joints[i]]
-            for tilt, seen_from in ((parent_tilt, parent_axes), (child_tilt, axes)):
-                _, y, z = seen_from.T @ hinge  # the X part is the frame's own
-                tilt[i] = np.arctan2(-y, z)
+            for k, seen_from in enumerate((parent_axes, axes)):
+                _, y, z = seen_from.T @ centres.hinges[skeleton.joints[i]]  # X is the frame's own
+                tilts[k, i] = np.arctan2(-y, z)
     present = [m for m in marker_set.markers if m.label in positions]
     on = [skeleton.carrying(m.segment, m.landmark) for m in present]
-    index = np.array([skeleton.index(segment) for segment in on])
-    placed = [(*frames[one], positions[m.label]) for m, one in zip(present, on, strict=True)]
-    local = np.array([axes.T @ (place - start) for start, axes, place in placed])
+    local = [
+        frames[name][1].T @ (positions[m.label] - frames[name][0])
+        for m, name in zip(present, on, strict=True)
+    ]
     return Person(
         skeleton,
         in_parent,
-        parent_tilt,
-        child_tilt,
+        tilts[0],
+        tilts[1],
         origin,
         _table_lengths(skeleton, centres, frames, sex, stature, landmarks),
         tuple(m.label for m in present),
-        index,
-        local,
+        np.array([skeleton.index(name) for name in on]),
+        np.array(local),
         np.array([m.weight for m in present]),
         ~np.array(skeleton.informed(set(on))),
     )
@@ -191,30 +188,31 @@ _ENDS = {  # joints at both ends, by row of the table; of a clavicle, which has 
 }
 
 
+def _joint_to_joint(centres: JointCentres, row: str, side: str) -> float:
+    start, end = (centres.positions[f"{one}_{side}" if side else one] for one in _ENDS[row])
+    return float(np.linalg.norm(end - start))
+
+
 def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.ndarray:
     """(n,) lengths as the anthropometric table defines them; of a clavicle, joint to joint."""
-    p = centres.positions
-    lengths: list[float] = []
-    for name, row in zip(skeleton.segments, skeleton.table_rows, strict=True):
+    p, lengths = centres.positions, np.empty(len(skeleton.segments))
+    for i, (name, row) in enumerate(zip(skeleton.segments, skeleton.table_rows, strict=True)):
         side = skeleton.side(name)
         if row in _ENDS:
-            start, end = (p[f"{joint}_{side}" if side else joint] for joint in _ENDS[row])
+            lengths[i] = _joint_to_joint(centres, row, side)
         elif row == "pelvis":
             start, axes = frames["lower_torso"]
-            middle = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - start)
-            lengths.append(float(np.hypot(middle[0], middle[1])))
-            continue
+            x, y, _ = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - start)
+            lengths[i] = np.hypot(x, y)
         elif row == "foot":
-            start, end = landmarks[f"calcaneus_{side}"], centres.ends[name]
+            lengths[i] = np.linalg.norm(centres.ends[name] - landmarks[f"calcaneus_{side}"])
         elif row == "hand" and name in centres.ends:
-            start, end = p[f"wrist_{side}"], centres.ends[name]
+            lengths[i] = np.linalg.norm(centres.ends[name] - p[f"wrist_{side}"])
         elif row == "head" and "vertex" in landmarks:
-            start, end = p["neck"], landmarks["vertex"]
+            lengths[i] = np.linalg.norm(landmarks["vertex"] - p["neck"])
         else:
-            lengths.append(mean_length_m(sex, row, stature))
-            continue
-        lengths.append(float(np.linalg.norm(end - start)))
-    return np.array(lengths)
+            lengths[i] = mean_length_m(sex, row, stature)
+    return lengths
 
 
 def _pose(person: Person, frames: Mapping[str, Frame]) -> np.ndarray:
@@ -332,20 +330,20 @@ def functional_landmarks(
     """
     found: dict[str, np.ndarray] = {}
     notes: list[str] = []
+    on: dict[str, list[Marker]] = {}
     hips = hip_centres(landmarks, sex)
+    for m in marker_set.markers:
+        if m.label in reference:
+            on.setdefault(m.segment, []).append(m)
     for side in "lr":
         missing = not {f"knee_lateral_{side}", f"malleolus_lateral_{side}"} & landmarks.keys()
         heel = landmarks.get(f"calcaneus_{side}")
-        front = [  # the foot's markers but the heel's
-            reference[m.label]
-            for m in marker_set.markers
-            if m.segment == f"foot_{side}" and not m.landmark.startswith("calcaneus")
-            if m.label in reference
-        ]
+        limb = [on.get(f"{name}_{side}", []) for name in ("thigh", "shank", "foot")]
+        front = [reference[m.label] for m in limb[2] if not m.landmark.startswith("calcaneus")]
         if not missing or hips is None or heel is None or not front:
             continue
-        knee = _joint("knee", f"thigh_{side}", f"shank_{side}", marker_set, reference, trials)
-        ankle = _joint("ankle", f"shank_{side}", f"foot_{side}", marker_set, reference, trials)
+        knee = _joint("knee", limb[:2], reference, trials)
+        ankle = _joint("ankle", limb[1:], reference, trials)
         if knee is None or ankle is None:
             continue
         above = knee.nearest_to(hips[side], heel)
@@ -366,26 +364,22 @@ def functional_landmarks(
 
 def _joint(
     kind: str,
-    proximal: str,
-    distal: str,
-    marker_set: MarkerSet,
+    segments: Sequence[Sequence[Marker]],
     reference: Mapping[str, np.ndarray],
     trials: Sequence[Mapping[str, np.ndarray]],
 ) -> FunctionalJoint | None:
-    """The joint between two segments; None where markers or movement do not show it."""
-    labels = [
-        [m.label for m in marker_set.markers if m.segment == segment and m.label in reference]
-        for segment in (proximal, distal)
-    ]
+    """The joint between two segments with these markers; None where markers or movement do not
+    show it."""
+    labels = [[m.label for m in markers] for markers in segments]
     complete = [trial for trial in trials if all(n in trial for n in [*labels[0], *labels[1]])]
     if min(map(len, labels)) < 3 or not complete:
         return None
-    clusters = [
+    clusters = (
         np.concatenate([np.stack([trial[n] for n in names], axis=1) for trial in complete])
         for names in labels
-    ]
-    still = [np.stack([reference[n] for n in names]) for names in labels]
-    joint = functional_joint(clusters[0], clusters[1], still[0], still[1])
+    )
+    still = (np.stack([reference[n] for n in names]) for names in labels)
+    joint = functional_joint(*clusters, *still)
     if joint is None or joint.residual_m > _LARGEST_RESIDUAL_M:
         return None
     return joint if np.rad2deg(joint.turned_rad) >= _LEAST_TURN_DEG[kind] else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -43,23 +44,7 @@ class Poses:
         return float(np.sqrt(np.nanmean(self.residual_m**2)))
 
 
-@dataclass(frozen=True)
-class Tree:
-    """A person's skeleton as the compiled kernel reads it, and the sizes of q and v."""
-
-    arrays: kernel.Tree
-    nq: int
-    nv: int
-
-    def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Orientation (N, n, 3, 3) and joint centre (N, n, 3) [m] of every segment, world."""
-        segments = len(self.arrays.kinds)
-        R, p = np.empty((len(q), segments, 3, 3)), np.empty((len(q), segments, 3))
-        kernel.forward_frames(np.ascontiguousarray(q), self.arrays, R, p)
-        return R, p
-
-
-def tree_of(person: Person) -> Tree:
+def tree_of(person: Person) -> kernel.Tree:
     """Flatten a person's skeleton for the kernel."""
     skeleton = person.skeleton
     nv = len(skeleton.v_names)
@@ -67,7 +52,7 @@ def tree_of(person: Person) -> Tree:
     v_parents = np.arange(-1, nv - 1)
     for start, parent in zip(skeleton.v_starts[1:], skeleton.parents[1:], strict=True):
         v_parents[start] = skeleton.v_starts[parent] + sizes[parent] - 1
-    arrays = kernel.Tree(
+    return kernel.Tree(
         kinds=np.array([_KINDS[kind] for kind in skeleton.joint_types]),
         parents=np.array(skeleton.parents),
         q_starts=np.array(skeleton.q_starts),
@@ -78,7 +63,6 @@ def tree_of(person: Person) -> Tree:
         rotations=person.joint_rotations(),
         axes=person.hinge_axes(),
     )
-    return Tree(arrays, len(skeleton.q_names), nv)
 
 
 def neutral(person: Person, turns_rad: np.ndarray | None = None) -> np.ndarray:
@@ -108,10 +92,11 @@ def solve_poses(
     iterations: int,
     may_show_nothing: bool = False,
 ) -> Poses:
-    """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
+    """Weighted least squares on all markers, robust beyond a limit.
 
     markers_m : (N, m, 3) world positions in the order of ``person.markers``, NaN where missing.
-    q_first : (nq,) where the first frame starts.
+    q_first : (nq,) where the first frame starts, each other one from the last; or (N, nq), where
+        each frame starts.
     marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik];
         ``posture_sd_rad`` may differ between coordinates (nv,).
 
@@ -119,19 +104,20 @@ def solve_poses(
     """
     if not may_show_nothing and not np.isfinite(markers_m).any():
         raise BadDataError("no marker is visible in any frame", expected="tracked markers")
-    tree = tree_of(person)
-    count, markers = markers_m.shape[:2]
-    q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
-    sd, steps = np.empty((count, tree.nv)), np.empty(count, dtype=np.int64)
+    count, nv = len(markers_m), len(person.skeleton.v_names)
+    starts = np.ascontiguousarray(np.atleast_2d(q_first))
+    q, residual = np.empty((count, starts.shape[1])), np.empty(markers_m.shape[:2])
+    sd, steps = np.empty((count, nv)), np.empty(count, dtype=np.int64)
     task = kernel.Task(
         segments=np.asarray(person.marker_segments),
         positions=person.markers_in_joint_m(),
         weights=person.marker_weights / marker_sd_m**2,
         limit=float(robust_limit_m),
-        prior=np.full(tree.nv, posture_sd_rad) ** -2.0,
+        prior=np.full(nv, posture_sd_rad) ** -2.0,
     )
     measured = np.ascontiguousarray(markers_m, dtype=float)
-    kernel.solve_frames(measured, q_first, tree.arrays, task, iterations, q, residual, sd, steps)
+    tree = tree_of(person)
+    kernel.solve_frames(measured, starts, tree, task, iterations, q, residual, sd, steps)
     return Poses(q, residual, sd, steps >= 0)
 
 
@@ -141,21 +127,17 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
     ``options`` and errors as in :func:`solve_poses`.
     """
     seen = np.isfinite(markers_m).all(axis=2).sum(axis=1)
-    first = int(np.argmax(seen)) if len(seen) else 0
     if not seen.any():
         return solve_poses(person, markers_m, neutral(person), **options)
+    first = int(np.argmax(seen))
     start = first_pose(person, markers_m[first], **options)
     after = solve_poses(person, markers_m[first:], start, **options)
     if first == 0:
         return after
     earlier, options = markers_m[first - 1 :: -1], options | {"may_show_nothing": True}
     before = solve_poses(person, earlier, after.q[0], **options)
-    return concatenated([Poses(*(values[::-1] for values in vars(before).values())), after])
-
-
-def concatenated(parts: Sequence[Poses]) -> Poses:
-    """Poses of one after the other."""
-    return Poses(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
+    both = zip(vars(before).values(), vars(after).values(), strict=True)
+    return Poses(*(np.concatenate([one[::-1], other]) for one, other in both))
 
 
 def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
@@ -165,15 +147,12 @@ def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
     raised arms seen from hanging ones may end in a wrong optimum. ``options`` as in
     :func:`solve_poses`. Hinge angles come back within half a turn of zero.
     """
-    rng = np.random.default_rng(_STARTS)
-    best, least = neutral(person), np.inf
-    for k in range(_STARTS):
-        turns = rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)) if k else None
-        placed = place_base(person, markers_m, neutral(person, turns))
-        poses = solve_poses(person, markers_m[None], placed, **options)
-        misfit = float(np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2))
-        if misfit < least:
-            best, least = poses.q[0], misfit
+    rng, nv = np.random.default_rng(_STARTS), len(person.skeleton.v_names)
+    turns = [None, *rng.normal(0.0, _START_SD_RAD, (_STARTS - 1, nv))]
+    starts = np.array([place_base(person, markers_m, neutral(person, one)) for one in turns])
+    poses = solve_poses(person, np.tile(markers_m, (_STARTS, 1, 1)), starts, **options)
+    misfits = np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2, axis=1)
+    best = poses.q[np.argmin(misfits)]
     joints = zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True)
     hinges = [at for at, kind in joints if kind == "revolute"]
     best[hinges] = (best[hinges] + np.pi) % (2 * np.pi) - np.pi
@@ -185,49 +164,68 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
 
     The fit takes the markers of the base segment where three are visible, else all of them.
     """
-    tree = tree_of(person)
-    R, p = tree.forward(q[None])
-    (model,) = model_markers(person, R, p)
+    at = posed(person, q[None])
     seen = np.isfinite(markers_m).all(axis=1)
     chosen = seen & (person.marker_segments == 0)
     if chosen.sum() < 3:
         chosen = seen
-    (turn,), (shift,) = rigid_motion(model[chosen], markers_m[chosen][None])
+    (turn,), (shift,) = rigid_motion(at.markers_m[0, chosen], markers_m[chosen][None])
     placed = q.copy()
     placed[:3] = turn @ q[:3] + shift
-    placed[3:7] = Rotation.from_matrix(turn @ R[0, 0]).as_quat()
+    placed[3:7] = Rotation.from_matrix(turn @ at.R[0, 0]).as_quat()
     return placed
-
-
-def model_markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """(N, m, 3) world positions of the markers for orientations and joint centres R, p."""
-    segments = person.marker_segments
-    return p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
 
 
 # --- how the model's markers move with the pose ---------------------------------------------------
 
 
-def marker_residuals(person: Person, q: np.ndarray, markers: np.ndarray) -> np.ndarray:
-    """(N, m, 3) markers less the model's, in the axes of their segments [m]; NaN where missing."""
-    R, p = tree_of(person).forward(q)
-    world = markers - model_markers(person, R, p)
-    return np.einsum("fmij,fmi->fmj", R[:, person.marker_segments], world)
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A person in N poses, world.
+
+    R, p : orientation (N, n, 3, 3) and joint centre (N, n, 3) [m] of every segment.
+    markers_m : (N, m, 3) where the model has the markers.
+    """
+
+    person: Person
+    R: np.ndarray
+    p: np.ndarray
+    markers_m: np.ndarray
+
+    def turns(self) -> np.ndarray:
+        """(N, m, 3, 3) axes of each marker's segment."""
+        return self.R[:, self.person.marker_segments]
+
+    def residuals(self, markers_m: np.ndarray) -> np.ndarray:
+        """(N, m, 3) markers less the model's, in the axes of their segments [m]; NaN where
+        missing."""
+        return np.einsum("fmij,fmi->fmj", self.turns(), markers_m - self.markers_m)
+
+    def columns(self, markers: Sequence[int] | slice = slice(None)) -> np.ndarray:
+        """(N, m, 3, nv) velocity of all or some markers for each unit velocity."""
+        places = np.ascontiguousarray(self.markers_m[:, markers])
+        below = np.ascontiguousarray(subtrees(self.person)[:, markers])
+        columns = np.zeros((*places.shape, len(self.person.skeleton.v_names)))
+        kernel.marker_columns(self.R, self.p, places, tree_of(self.person), below, columns)
+        return columns
+
+
+def posed(person: Person, q: np.ndarray) -> Posed:
+    """The person in poses q (N, nq)."""
+    shape, segments = (len(q), len(person.skeleton.segments), 3), person.marker_segments
+    R, p = np.empty((*shape, 3)), np.empty(shape)
+    kernel.forward_frames(np.ascontiguousarray(q), tree_of(person), R, p)
+    apart = np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
+    return Posed(person, R, p, p[:, segments] + apart)
 
 
 def subtrees(person: Person) -> np.ndarray:
     """(n, m) True where marker m hangs on segment n or beyond it."""
-    segments, skeleton = person.marker_segments, person.skeleton
-    return np.array([np.isin(segments, skeleton.beyond(i)) for i in range(len(skeleton.segments))])
-
-
-def pose_columns(
-    tree: Tree, R: np.ndarray, p: np.ndarray, model: np.ndarray, below: np.ndarray
-) -> np.ndarray:
-    """(N, m, 3, nv) velocity of each marker for each unit velocity."""
-    columns = np.zeros((*model.shape, tree.nv))
-    kernel.marker_columns(R, p, model, tree.arrays, below, columns)
-    return columns
+    parents = person.skeleton.parents
+    below = np.arange(len(parents))[:, None] == person.marker_segments
+    for i in range(len(parents) - 1, 0, -1):
+        below[parents[i]] |= below[i]
+    return below
 
 
 def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np.ndarray:
@@ -235,10 +233,7 @@ def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np
 
     ``prior_rad`` is the posture prior's standard deviation over that of the markers.
     """
-    tree = tree_of(person)
-    R, p = tree.forward(q)
-    columns = pose_columns(tree, R, p, model_markers(person, R, p), subtrees(person))
-    return np.linalg.inv(coordinate_information(person, columns, prior_rad))
+    return np.linalg.inv(coordinate_information(person, posed(person, q).columns(), prior_rad))
 
 
 def coordinate_information(person: Person, columns: np.ndarray, prior_rad: float) -> np.ndarray:
@@ -264,59 +259,59 @@ class PoseResponse:
     """The least-squares step of the inverse kinematics at poses q (N, nq).
 
     weights : (N, m) of the markers; 0 where one is missing.
-    inverse : (N, nv, nv) of the weighted normal matrix, with a weak prior on all coordinates.
     """
 
     person: Person
     q: np.ndarray
     weights: np.ndarray
-    inverse: np.ndarray
 
-    def of(self, errors_m: np.ndarray, markers: Sequence[int] | None = None) -> np.ndarray:
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """(N, nv, nv) of the weighted normal matrix, with a weak prior on all coordinates."""
+        nv = len(self.person.skeleton.v_names)
+        inverse = np.empty((len(self.q), nv, nv))
+        for part, at in self._blocks():
+            weighted = _flat(np.sqrt(self.weights[part])[..., None, None] * at.columns())
+            information = weighted.swapaxes(1, 2) @ weighted
+            information[:, range(nv), range(nv)] += _PRIOR_M**2
+            inverse[part] = np.linalg.inv(information)
+        return inverse
+
+    def _blocks(self) -> Iterator[tuple[slice, Posed]]:
+        """Some frames after the others: the columns of all at once may not fit into memory."""
+        for start in range(0, len(self.q), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            yield part, posed(self.person, self.q[part])
+
+    def of(self, errors_m: np.ndarray, markers: Sequence[int] | slice = slice(None)) -> np.ndarray:
         """(N, nv, k) change of the pose, in the tangent space.
 
         errors_m : (N, m, 3, k) [m] of all markers, world axes, or only of those numbered.
         """
-        chosen = range(len(self.person.markers)) if markers is None else markers
         moved = np.empty((len(self.q), self.inverse.shape[1], errors_m.shape[-1]))
-        for part, columns, _ in _columns(self.person, self.q, chosen):
-            weighted = self.weights[part][:, chosen, None, None] * errors_m[part]
-            moved[part] = _flat(columns).swapaxes(1, 2) @ _flat(weighted)
+        for part, at in self._blocks():
+            weighted = self.weights[part][:, markers, None, None] * errors_m[part]
+            moved[part] = _flat(at.columns(markers)).swapaxes(1, 2) @ _flat(weighted)
         return self.inverse @ moved
 
     def left(
         self,
         errors_m: np.ndarray,
-        markers: Sequence[int] | None = None,
+        markers: Sequence[int] | slice = slice(None),
         moved: np.ndarray | None = None,
     ) -> np.ndarray:
         """(N, m, 3, k) change of every marker's residual: its error less what the pose follows.
 
-        In the axes of the markers' segments, as :func:`marker_residuals`.
+        In the axes of the markers' segments, as :meth:`Posed.residuals`.
         ``moved`` (N, nv, k) is the pose's answer where it is not :meth:`of` the errors.
         """
-        chosen = range(len(self.person.markers)) if markers is None else markers
         moved = self.of(errors_m, markers) if moved is None else moved
         left = np.empty((*self.weights.shape, 3, errors_m.shape[-1]))
-        for part, columns, turn in _columns(self.person, self.q):
-            change = -(_flat(columns) @ moved[part]).reshape(left[part].shape)
-            change[:, chosen] += errors_m[part]
-            left[part] = turn.swapaxes(2, 3) @ change
+        for part, at in self._blocks():
+            change = -(_flat(at.columns()) @ moved[part]).reshape(left[part].shape)
+            change[:, markers] += errors_m[part]
+            left[part] = at.turns().swapaxes(2, 3) @ change
         return left
-
-
-def pose_responses(person: Person, q: np.ndarray, trust: np.ndarray | None = None) -> PoseResponse:
-    """At q (N, nq); ``trust`` (N, m) is the part of its weight that each marker keeps."""
-    share = np.ones((len(q), len(person.markers))) if trust is None else trust
-    weights = share * person.marker_weights
-    nv = len(person.skeleton.v_names)
-    inverse = np.empty((len(q), nv, nv))
-    for part, columns, _ in _columns(person, q):
-        weighted = _flat(np.sqrt(weights[part])[..., None, None] * columns)
-        information = weighted.swapaxes(1, 2) @ weighted
-        information[:, range(nv), range(nv)] += _PRIOR_M**2
-        inverse[part] = np.linalg.inv(information)
-    return PoseResponse(person, q, weights, inverse)
 
 
 def marker_trust(residual_m: np.ndarray, limit_m: float) -> np.ndarray:
@@ -327,21 +322,6 @@ def marker_trust(residual_m: np.ndarray, limit_m: float) -> np.ndarray:
     distance = np.linalg.norm(residual_m, axis=2)
     share = np.minimum(1.0, limit_m / np.maximum(np.nan_to_num(distance), 1e-9)) ** 2
     return np.where(np.isfinite(distance), share, 0.0)
-
-
-def _columns(
-    person: Person, q: np.ndarray, markers: Sequence[int] | None = None
-) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-    """Frames, velocity (n, m, 3, nv) of all or some markers for unit velocities, and the axes
-    (n, m, 3, 3) of their segments."""
-    chosen = range(len(person.markers)) if markers is None else markers
-    tree, below = tree_of(person), subtrees(person).take(chosen, axis=1)
-    for start in range(0, len(q), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        R, p = tree.forward(q[part])
-        model = model_markers(person, R, p).take(chosen, axis=1)
-        axes = R[:, person.marker_segments.take(chosen)]
-        yield part, pose_columns(tree, R, p, model, below), axes
 
 
 def _flat(x: np.ndarray) -> np.ndarray:

@@ -373,18 +373,21 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
 
 
 @compiled
-def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
-    """Least-squares pose of every frame, each started from the last that shows a marker: without
-    one the prior leads to the neutral pose, from which others may end in a wrong optimum.
+def solve_frames(markers, starts, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
+    """Least-squares pose of every frame, from its start where it has one, else from the last frame
+    that shows a marker: without one the prior leads to the neutral pose, from which others may end
+    in a wrong optimum.
 
-    markers (N, m, 3) [m], NaN where missing; q_first (nq,). Fills q_out (N, nq), residual_out
-    (N, m) [m], sd_out (N, nv) (standard deviation of each coordinate, given those nearer to the
-    base) and steps_out (N,), -1 where the steps ran out.
+    markers (N, m, 3) [m], NaN where missing; starts (k, nq) of the first k frames. Fills q_out
+    (N, nq), residual_out (N, m) [m], sd_out (N, nv) (standard deviation of each coordinate, given
+    those nearer to the base) and steps_out (N,), -1 where the steps ran out.
     """
     nv = tree.v_segments.size
     residuals, L = np.empty((task.weights.size, 3)), np.zeros((nv, nv))
-    q, last = q_first.copy(), q_first.copy()
+    q, last = starts[0].copy(), starts[0].copy()
     for frame in range(markers.shape[0]):
+        if frame < starts.shape[0]:
+            q[:] = starts[frame]
         steps_out[frame] = _solve_frame(q, markers[frame], tree, task, max_steps, residuals, L)
         q_out[frame] = q
         if np.isnan(markers[frame]).all():

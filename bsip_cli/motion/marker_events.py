@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import chdtri, fdtrc
 
-from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
+from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit
 from bsip_cli.segments import in_words
 
 # --- one change of level in an autocorrelated signal that also follows known columns --------------
@@ -40,21 +40,12 @@ class LevelChange:
     z: float
 
 
-class _Problem:
-    """Sums over the samples z = [X, y] (n, 1 + k + d): the constant, the columns, the signal.
+class _Steps:
+    """A signal y (n, d), columns (n, k) that it follows, and a step at one of the places (p,).
 
-    Whitened by a correlation r, the sample at t is z[t] - r z[t - 1], the first one
-    sqrt(1 - r^2) z[0]; so every product of whitened signals follows from these sums, and no
-    correlation that is tried needs the samples again.
-
-    z : (n, 1 + k + d); ``of_x`` = 1 + k.
-    squares, neighbours, ends : sums of z z', of z[t] z[t - 1]' and its transpose, and of the
-        first and the last sample's z z'.
-    places : (p,) where a step may be.
-    after, around : (p, 1 + k + d) sums of the samples from a place on, and of those from the
-        places before and after it on.
-    penalised : (1 + k, 1 + k) ones on the diagonal for the columns, zero for the constant.
-    coefficient_sd : prior spread of the columns' coefficients.
+    Whitened by a correlation r, the sample at t of z = [1, columns, y] is z[t] - r z[t - 1], the
+    first one sqrt(1 - r^2) z[0]; so every product of whitened signals follows from a few sums, and
+    no correlation that is tried needs the samples again.
     """
 
     def __init__(
@@ -62,19 +53,52 @@ class _Problem:
     ) -> None:
         z = np.concatenate([np.ones((len(y), 1)), columns, y], axis=1)
         z[:, 1:] -= z[:, 1:].mean(axis=0)
-        follow, from_on = z[1:].T @ z[:-1], np.zeros((len(z) + 1, z.shape[1]))
-        from_on[:-1] = np.cumsum(z[::-1], axis=0)[::-1]
-        self.z, self.of_x = z, 1 + columns.shape[1]
+        self.z, self.of_x, self.places = z, 1 + columns.shape[1], places
+        follow = z[1:].T @ z[:-1]
+        # of z[t] z[t]', of z[t] z[t - 1]' with its transpose, and of the first and the last sample
         self.squares, self.neighbours = z.T @ z, follow + follow.T
         self.ends = np.outer(z[0], z[0]) + np.outer(z[-1], z[-1])
-        self.places, self.after = places, from_on[places]
-        self.around = from_on[places - 1] + from_on[places + 1]
-        self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
+        from_on = np.zeros((len(z) + 1, z.shape[1]))
+        from_on[:-1] = np.cumsum(z[::-1], axis=0)[::-1]
+        # (p, 1 + k + d) of the samples from a place on, and from the ones before and after it on
+        self.after, self.around = from_on[places], from_on[places - 1] + from_on[places + 1]
         self.coefficient_sd = coefficient_sd
 
     def prior(self, error: float) -> np.ndarray:
-        """(1 + k, 1 + k) what the prior adds to the equations."""
-        return self.penalised * (error / self.coefficient_sd) ** 2
+        """(1 + k, 1 + k) what the prior of the columns adds to the equations."""
+        free = [0.0] + [1.0] * (self.of_x - 1)  # the constant has none
+        return np.diag(free) * (error / self.coefficient_sd) ** 2
+
+    def best(self, correlation: float, error: float) -> LevelChange | None:
+        """The step that gains most; None where the columns could make each as well."""
+        n, x, r = len(self.z), self.of_x, correlation
+        d = self.z.shape[1] - x
+        # Whitened: the sum of z z', and (p, 1 + k + d) products of z with a step at each place.
+        products = (1.0 + r * r) * self.squares - r * self.neighbours - r * r * self.ends
+        steps = (1.0 + r * r) * self.after - r * self.around + r * (1.0 - r) * self.z[-1]
+        inverse = np.linalg.inv(products[:x, :x] + self.prior(error))
+        coefficients = inverse @ products[:x, x:]
+        # What the columns leave of the signal and of the steps: the gain of each step follows.
+        rest = steps[:, x:] - steps[:, :x] @ coefficients
+        length = 1.0 + (1.0 - correlation) ** 2 * (n - 1 - self.places)
+        own = length - ((steps[:, :x] @ inverse) * steps[:, :x]).sum(axis=1)
+        freedom = n - 1 - float((inverse * products[:x, :x]).sum())
+        possible = own > 1e-3 * length
+        if not possible.any() or freedom < _LEAST_FREEDOM:
+            return None
+        gain = np.where(possible, (rest**2).sum(axis=1) / np.where(possible, own, 1.0), -1.0)
+        k = int(np.argmax(gain))
+        # What the prior holds back of the columns counts among the errors.
+        squares = float(np.trace(products[x:, x:]) - (coefficients * products[:x, x:]).sum())
+        variance = max((squares - gain[k]) / (d * freedom), 1e-18)
+        z2 = chdtri(d, max(fdtrc(d, d * freedom, gain[k] / variance / d), 1e-300))
+        return LevelChange(
+            at=int(self.places[k]),
+            step=rest[k] / own[k],
+            step_sd=float(np.sqrt(variance / own[k])),
+            spread=float(np.sqrt(variance / (1.0 - correlation**2))),
+            z=float(np.sqrt(z2)),
+        )
 
 
 def two_levels(y: np.ndarray, before: int, after: int) -> int:
@@ -111,54 +135,23 @@ def find_level_change(
     places = places[(places > 0) & (places < n)]
     if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
-    problem = _Problem(y, columns, places, coefficient_sd)
-    x = problem.of_x
-    X, square, correlation = problem.z[:, :x], problem.squares[:x, :x], 0.0
+    steps, correlation = _Steps(y, columns, places, coefficient_sd), 0.0
+    x = steps.of_x
+    X, square = steps.z[:, :x], steps.squares[:x, :x]
     error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
-        found = _best(problem, correlation, error)
+        found = steps.best(correlation, error)
         if found is None:
             return None
         # of neighbours among what columns and step leave, fitted as if there were none
-        stepped = problem.z[:, x:].copy()
+        stepped = steps.z[:, x:].copy()
         stepped[found.at :] -= found.step
-        left = stepped - X @ np.linalg.solve(square + problem.prior(error), X.T @ stepped)
+        left = stepped - X @ np.linalg.solve(square + steps.prior(error), X.T @ stepped)
         power = float((left[:-1] ** 2).sum())
         value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
         correlation = float(np.clip(value, 0.0, _LARGEST_CORRELATION))
         error = max(found.spread * np.sqrt(1.0 - correlation**2), _LEAST_ERROR)
-    return _best(problem, correlation, error)
-
-
-def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:
-    n, x, r = len(problem.z), problem.of_x, correlation
-    d = problem.z.shape[1] - x
-    # Whitened: the sum of z z', and (p, 1 + k + d) products of z with a step at each place.
-    products = (1.0 + r * r) * problem.squares - r * problem.neighbours - r * r * problem.ends
-    steps = (1.0 + r * r) * problem.after - r * problem.around + r * (1.0 - r) * problem.z[-1]
-    inverse = np.linalg.inv(products[:x, :x] + problem.prior(error))
-    coefficients = inverse @ products[:x, x:]
-    # What the columns leave of the signal and of the steps: the gain of each step follows.
-    rest = steps[:, x:] - steps[:, :x] @ coefficients
-    length = 1.0 + (1.0 - correlation) ** 2 * (n - 1 - problem.places)
-    own = length - ((steps[:, :x] @ inverse) * steps[:, :x]).sum(axis=1)
-    freedom = n - 1 - float((inverse * products[:x, :x]).sum())
-    possible = own > 1e-3 * length
-    if not possible.any() or freedom < _LEAST_FREEDOM:
-        return None
-    gain = np.where(possible, (rest**2).sum(axis=1) / np.where(possible, own, 1.0), -1.0)
-    k = int(np.argmax(gain))
-    # What the prior holds back of the columns counts among the errors.
-    squares = float(np.trace(products[x:, x:]) - (coefficients * products[:x, x:]).sum())
-    variance = max((squares - gain[k]) / (d * freedom), 1e-18)
-    z2 = chdtri(d, max(fdtrc(d, d * freedom, gain[k] / variance / d), 1e-300))
-    return LevelChange(
-        at=int(problem.places[k]),
-        step=rest[k] / own[k],
-        step_sd=float(np.sqrt(variance / own[k])),
-        spread=float(np.sqrt(variance / (1.0 - correlation**2))),
-        z=float(np.sqrt(z2)),
-    )
+    return steps.best(correlation, error)
 
 
 # --- markers that are misplaced since the calibration, throughout a trial or from a moment on -----
@@ -200,7 +193,7 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
         candidates = [int(m) for m in np.flatnonzero(enough) if shown[m] > least[m]]
         if not candidates:
             break
-        m, vector = best_source(fit.response, mean, sd, candidates)
+        m, vector, made = fit.source_of(mean, sd, candidates)
         size = float(np.linalg.norm(vector))
         if size < limit[m]:
             break
@@ -208,7 +201,7 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
         kind: Kind = "slip" if start else "offset"
         frames = slice(start, len(residual))
         events.append(event(fit, kind, m, frames, size, float(_OFFSET * size / limit[m])))
-        mean = mean - np.einsum("jak,k->ja", fit.response[:, :, m], vector)
+        mean = mean - made
         mean[m] = 0.0
     return events
 

@@ -42,75 +42,8 @@ from bsip_cli.motion.marker_events import (
     pieces,
     two_levels,
 )
-from bsip_cli.motion.marker_exchange import (
-    Exchange,
-    Labelling,
-    Refit,
-    as_recorded,
-    best_fitting,
-    exchanged,
-    exchanged_back,
-    misfit_m,
-    refitted,
-    reordered,
-    some_frames,
-    swaps,
-)
-from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
-from bsip_cli.segments import mirrored
-
-# --- both arms or both legs that bear each other's labels throughout ------------------------------
-
-
-_FAR = 3.0  # misfit of the trial over the trusted distance
-_BETTER = 0.5  # misfit exchanged over that as labelled
-_ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
-_LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
-_LATERAL_M = 0.05  # a marker of the trunk this far from its middle belongs to a side
-_MIRRORED_M = 0.1  # the places of a pair are mirrored to this
-
-
-def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
-    """Labels of the limbs corrected, with the events.
-
-    All markers of one limb pull the other limb's model over, or turn the trunk round, so single
-    pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames
-    with the limbs exchanged; if that at least halves the residual of all markers, they are.
-    """
-    whole = slice(0, len(fit.times_s))
-    before = misfit_m(fit.distance_m()[some_frames(fit)])
-    if not before > _FAR * fit.trusted_m.min():
-        return as_recorded(fit)
-    limbs = [[Exchange(a, b, whole, 1.0) for a, b in _mirrored_pairs(fit, limb)] for limb in _LIMBS]
-    after, found = best_fitting(fit, refit, limbs)
-    if not after < _BETTER * before:
-        return as_recorded(fit)
-    suspected = [replace(one, statistic=before / after) for one in found]
-    return exchanged_back(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
-
-
-def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Markers of the right side of some segments and those that lie mirrored on the left one."""
-    side = np.array(
-        [
-            {"_r": 1, "_l": -1}.get(name[-2:], int(np.sign(z)) * (abs(z) > _LATERAL_M))
-            for name, z in zip(fit.segments, fit.place_m[:, 2], strict=True)
-        ]
-    )
-    seen = np.isfinite(fit.measured_m[..., 0])
-    near = sorted(
-        (float(np.linalg.norm(fit.place_m[a] * [1.0, 1.0, -1.0] - fit.place_m[b])), a, b)
-        for a, segment in enumerate(fit.segments)
-        for b, other in enumerate(fit.segments)
-        if segment.removesuffix("_r") in limb and other == mirrored(segment)
-        if side[a] == 1 and side[b] == -1 and (seen[:, a] & seen[:, b]).any()
-    )
-    pairs: list[tuple[int, int]] = []
-    for apart, a, b in near:
-        if apart < _MIRRORED_M and not {a, b} & {k for pair in pairs for k in pair}:
-            pairs.append((a, b))
-    return pairs
-
+from bsip_cli.motion.marker_exchange import Labelling, Refit, exchanged, relabelled
+from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit
 
 # --- markers that leave their place for a moment: ghosts, flickers, badly filled gaps -------------
 
@@ -125,7 +58,7 @@ _Jump = tuple[int, slice]  # marker and frames
 
 
 def jumps(
-    fit: MarkerFit, residual: np.ndarray, filled: np.ndarray | None
+    fit: MarkerFit, residual: np.ndarray, filled: np.ndarray
 ) -> tuple[list[MarkerEvent], np.ndarray]:
     """Events, and (N, m) frames in which a marker is astray.
 
@@ -159,8 +92,7 @@ def jumps(
                 astray[piece, m] = True
     events = []
     for (m, piece), size in _own(fit, away, spread, found):
-        gap = filled is not None and filled[piece, m].mean() > 0.5
-        note = ", where a gap was filled" if gap else ""
+        note = ", where a gap was filled" if filled[piece, m].mean() > 0.5 else ""
         statistic = float(np.nanmax(distance[piece, m]) / spread[piece, m].max())
         events.append(event(fit, "jump", m, piece, size, statistic, note=note))
     return events, astray
@@ -180,8 +112,7 @@ def _own(
         peak = frames.start + int(np.nanargmax(distance[frames, first]))
         sd = np.hypot(spread[peak], 0.1 * distance[peak, first])
         candidates = [m for m, _ in together if np.isfinite(distance[peak, m])]
-        m, vector = best_source(fit.response, away[peak], sd, candidates)
-        made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
+        m, vector, made = fit.source_of(away[peak], sd, candidates)
         missed = np.linalg.norm(away[peak] - made, axis=1)
         source = next(one for one in together if one[0] == m)
         size = max(float(np.linalg.norm(vector)), float(np.nanmax(distance[source[1], m])))
@@ -253,10 +184,11 @@ class _Search:
         frames, most = round(_BLOCK_S / fit.step_s()), len(residual) // _MOST_BLOCKS
         self.frames = max(1, frames, most)
         self.least = max(3, round(_STAYS_S / (self.frames * fit.step_s())))
-        self.columns = {
-            name: block_means(np.concatenate([x, (x - np.mean(x, axis=0)) ** 2], 1), self.frames)
-            for name, x in fit.pose.items()
-        }
+        self.columns = {}  # by segment
+        for k in np.unique(fit.person.marker_segments).tolist():
+            x = fit.angles_about(k)
+            both = np.concatenate([x, (x - np.mean(x, axis=0)) ** 2], axis=1)
+            self.columns[k] = block_means(both, self.frames)
         self.means = block_means(self.left, self.frames)
         self.best: dict[int, LevelChange | None] = {}
 
@@ -279,7 +211,7 @@ class _Search:
         at = None if block is None else int(np.searchsorted(seen, block))
         if len(seen) < 2 * least:
             return None
-        columns = self.columns[self.fit.segments[m]][seen]
+        columns = self.columns[self.fit.person.marker_segments[m]][seen]
         found = find_level_change(self.means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
         return replace(found, at=int(seen[found.at])) if found else None
 
@@ -296,9 +228,8 @@ class _Search:
         near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first: strongest}
         field[first], sd[first] = strongest.step, strongest.step_sd
         sd = np.hypot(sd, 0.1 * np.linalg.norm(strongest.step))
-        m, vector = best_source(fit.response, field, sd, list(near))
+        m, vector, made = fit.source_of(field, sd, list(near))
         frame = self._frame(m, near[m])
-        made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
         left = np.linalg.norm(field - made, axis=1)
         same = left < _SAME_SHARE * np.linalg.norm(field, axis=1)
         same[m] = True
@@ -390,13 +321,12 @@ def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray | None = No
     filled : (N, m) positions that were estimated over a gap: they may jump, but are no evidence
         of slips and offsets.
     """
-    labelling = swaps(reordered(swapped_limbs(fit, refit), refit), refit)
+    labelling = relabelled(Labelling(fit, refit))
     fit = labelling.fit
-    filled = None if filled is None else exchanged(filled, labelling.order)
-    residual = fit.residual_m
-    jumped, astray = jumps(fit, residual, filled)
-    guessed = astray if filled is None else astray | filled
-    residual = np.where(guessed[..., None], np.nan, residual)
+    recorded = np.zeros(fit.measured_m.shape[:2], dtype=bool) if filled is None else filled
+    guessed = exchanged(recorded, labelling.order)
+    jumped, astray = jumps(fit, fit.residual_m, guessed)
+    residual = np.where((astray | guessed)[..., None], np.nan, fit.residual_m)
     slipped, level = slips(fit, residual)
     events = [*labelling.events, *jumped, *slipped, *offsets(fit, level)]
     events.sort(key=lambda one: (one.start_s, one.kind, -one.size_m))

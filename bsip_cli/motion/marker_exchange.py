@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from bsip_cli.motion.marker_fit import MarkerFit
 from bsip_cli.segments import mirrored
 
 Refit = Callable[[np.ndarray, np.ndarray], MarkerFit]
-
-_LARGEST_M = 0.2  # a marker farther off says no more
+_FAR = 3.0  # residual, of a marker or of all, over the trusted distance; over the usual residual
+_NEARER = 0.5  # misfit exchanged over that as labelled; distance to the other's place over the own
 
 
 @dataclass(frozen=True)
@@ -33,21 +33,81 @@ class Exchange:
 
 @dataclass(frozen=True, eq=False)
 class Labelling:
-    """A fit and the labels it rests on.
+    """A fit, the labels it rests on, and how poses are fitted to others.
 
     fit : poses and markers with the labels corrected.
-    order : (N, m) under each label, the recorded label of the marker that bears it now.
-    events : the exchanges that were found, corrected or not.
+    refit : poses fitted to other markers (n, m, 3) at times (n,).
+    done : the exchanges that correct the labels, one after the other.
+    events : all exchanges that were found, corrected or not.
     """
 
     fit: MarkerFit
-    order: np.ndarray
+    refit: Refit
+    done: tuple[Exchange, ...] = ()
     events: tuple[MarkerEvent, ...] = ()
 
+    @property
+    def order(self) -> np.ndarray:
+        """(N, m) under each label, the recorded label of the marker that bears it now."""
+        return _order(self.fit, self.done)
 
-def as_recorded(fit: MarkerFit) -> Labelling:
-    """Every marker under its own label."""
-    return Labelling(fit, _order(fit, ()))
+    def refitted(
+        self, exchanges: Sequence[Exchange], frames: slice | np.ndarray = slice(None)
+    ) -> MarkerFit:
+        """The poses fitted again, to all or some frames, with these labels exchanged."""
+        markers = exchanged(self.fit.measured_m, _order(self.fit, exchanges))
+        return self.refit(markers[frames], self.fit.times_s[frames])
+
+    def best_fitting(self, tried: Iterable[Sequence[Exchange]]) -> tuple[float, Sequence[Exchange]]:
+        """Those exchanges with which poses fitted to some frames lie nearest to the markers, and
+        how near [m]."""
+        frames = _some_frames(self.fit)
+        misfits = ((self.refitted(one, frames).misfit_m(), one) for one in tried)
+        return min(misfits, key=lambda one: one[0])
+
+    def exchanged_back(self, again: MarkerFit, suspected: Sequence[Exchange]) -> Labelling:
+        """Exchange suspected labels back, but for those that would leave a marker farther off.
+
+        A marker involved must come nearer to the model, or lie within what markers are trusted to;
+        the others are left as labelled and the poses fitted again without them, until that holds of
+        all that remain. All markers together must fit better than before, or none is exchanged.
+
+        again : the fit with all suspected labels exchanged (:meth:`refitted`).
+        """
+        fit, kept = self.fit, list(suspected)
+        limit = 3**0.5 * float(fit.trusted_m.min())  # trusted in each of three directions
+
+        def comes_nearer(one: Exchange) -> bool:
+            pairs = [[x.misfit_m(m, one.frames) for x in (again, fit)] for m in (one.a, one.b)]
+            return all(now < max(was, limit) for now, was in pairs)
+
+        while nearer := list(filter(comes_nearer, kept)):
+            if len(nearer) == len(kept):
+                break
+            kept, again = nearer, self.refitted(nearer)
+        return self.after(again, suspected, nearer if again.misfit_m() < fit.misfit_m() else [])
+
+    def after(
+        self, again: MarkerFit, suspected: Sequence[Exchange], done: Sequence[Exchange]
+    ) -> Labelling:
+        """With the events of all that are suspected, and those that are done, as ``again`` has."""
+        events = list(self.events)
+        for one in suspected:
+            a, b = (self.fit.measured_m[one.frames, m] for m in (one.a, one.b))
+            apart = float(np.nanmedian(np.linalg.norm(a - b, axis=1)))
+            how = (one.frames, apart, one.statistic)
+            is_done = one in done
+            swap = event(self.fit, "swap", one.a, *how, partner=one.b, put_right=is_done)
+            events.append(swap)
+        fit, all_done = again if done else self.fit, (*self.done, *done)
+        return replace(self, fit=fit, done=all_done, events=tuple(events))
+
+
+def _order(fit: MarkerFit, exchanges: Iterable[Exchange]) -> np.ndarray:
+    order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
+    for one in exchanges:
+        order[one.frames, [one.a, one.b]] = order[one.frames, [one.b, one.a]]
+    return order
 
 
 def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -55,92 +115,68 @@ def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
     return np.take_along_axis(markers, order.reshape(*order.shape, *[1] * (markers.ndim - 2)), 1)
 
 
-def refitted(
-    fit: MarkerFit,
-    refit: Refit,
-    exchanges: Sequence[Exchange],
-    frames: slice | np.ndarray = slice(None),
-) -> MarkerFit:
-    """The poses fitted again, to all or some frames, with these labels exchanged."""
-    markers = exchanged(fit.measured_m, _order(fit, exchanges))
-    return refit(markers[frames], fit.times_s[frames])
-
-
 _FRAMES = 24  # that show which exchanges are the likeliest
 
 
-def some_frames(fit: MarkerFit) -> np.ndarray:
+def _some_frames(fit: MarkerFit) -> np.ndarray:
     """(k,) evenly over the trial."""
     return np.unique(np.linspace(0, len(fit.times_s) - 1, _FRAMES).astype(int))
 
 
-def best_fitting(
-    fit: MarkerFit, refit: Refit, tried: Iterable[Sequence[Exchange]]
-) -> tuple[float, Sequence[Exchange]]:
-    """Those exchanges with which poses fitted to some frames lie nearest to the markers, and how
-    near [m]."""
-    frames = some_frames(fit)
-    misfits = []
-    for exchanges in tried:
-        again = refitted(fit, refit, exchanges, frames)
-        misfits.append((misfit_m(again.distance_m()), exchanges))
-    return min(misfits, key=lambda one: one[0])
+def relabelled(labelling: Labelling) -> Labelling:
+    """Labels corrected where that is clear: of whole limbs, of all markers of a segment, of
+    pairs."""
+    return _swaps(_reordered(_limbs(labelling)))
 
 
-def exchanged_back(
-    labelling: Labelling, again: MarkerFit, refit: Refit, suspected: Sequence[Exchange]
-) -> Labelling:
-    """Exchange suspected labels back, but for those that would leave a marker farther off.
+# --- both arms or both legs that bear each other's labels throughout ------------------------------
 
-    A marker involved must come nearer to the model, or lie within what markers are trusted to;
-    the others are left as labelled and the poses fitted again without them, until that holds of
-    all that remain. All markers together must fit better than before, or none is exchanged.
 
-    again : the fit with all suspected labels exchanged (:func:`refitted`).
+_ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
+_LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
+_LATERAL_M = 0.05  # a marker of the trunk this far from its middle belongs to a side
+_MIRRORED_M = 0.1  # the places of a pair are mirrored to this
+
+
+def _limbs(labelling: Labelling) -> Labelling:
+    """Labels of both arms or both legs corrected, with the events.
+
+    All markers of one limb pull the other limb's model over, or turn the trunk round, so single
+    pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames
+    with the limbs exchanged; if that at least halves the residual of all markers, they are.
     """
-    fit, kept = labelling.fit, list(suspected)
-    limit = 3**0.5 * float(fit.trusted_m.min())  # trusted in each of three directions
-
-    def comes_nearer(one: Exchange) -> bool:
-        pairs = [[x.distance_m(m)[one.frames] for x in (again, fit)] for m in (one.a, one.b)]
-        return all(misfit_m(now) < max(misfit_m(was), limit) for now, was in pairs)
-
-    while nearer := list(filter(comes_nearer, kept)):
-        if len(nearer) == len(kept):
-            break
-        kept, again = nearer, refitted(fit, refit, nearer)
-    done = nearer if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()) else []
-    return _labelled(labelling, again, suspected, done)
+    fit = labelling.fit
+    whole = slice(0, len(fit.times_s))
+    before = fit.misfit_m(frames=_some_frames(fit))
+    if not before > _FAR * fit.trusted_m.min():
+        return labelling
+    limbs = [[Exchange(a, b, whole, 1.0) for a, b in _mirrored_pairs(fit, limb)] for limb in _LIMBS]
+    after, found = labelling.best_fitting(limbs)
+    if not after < _NEARER * before:
+        return labelling
+    suspected = [replace(one, statistic=before / after) for one in found]
+    return labelling.exchanged_back(labelling.refitted(suspected), suspected)
 
 
-def _labelled(
-    labelling: Labelling, again: MarkerFit, suspected: Sequence[Exchange], done: Sequence[Exchange]
-) -> Labelling:
-    """With the events of all that are suspected, and those that are done, which ``again`` has."""
-    fit, events = labelling.fit, []
-    for one in suspected:
-        a, b = (fit.measured_m[one.frames, m] for m in (one.a, one.b))
-        apart = float(np.nanmedian(np.linalg.norm(a - b, axis=1)))
-        how = (one.frames, apart, one.statistic)
-        events.append(event(fit, "swap", one.a, *how, partner=one.b, put_right=one in done))
-    return Labelling(
-        again if done else fit,
-        exchanged(labelling.order, _order(fit, done)),
-        (*labelling.events, *events),
+def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Markers of the right side of some segments and those that lie mirrored on the left one."""
+    places, segments = fit.person.marker_positions_m, fit.segments
+    of_trunk = np.where(np.abs(places[:, 2]) > _LATERAL_M, np.sign(places[:, 2]), 0.0)
+    ends = zip(segments, of_trunk, strict=True)
+    side = [{"_r": 1.0, "_l": -1.0}.get(name[-2:], own) for name, own in ends]
+    seen = np.isfinite(fit.measured_m[..., 0])
+    near = sorted(
+        (float(np.linalg.norm(places[a] * [1.0, 1.0, -1.0] - places[b])), a, b)
+        for a, segment in enumerate(segments)
+        for b, other in enumerate(segments)
+        if segment.removesuffix("_r") in limb and other == mirrored(segment)
+        if side[a] == 1 and side[b] == -1 and (seen[:, a] & seen[:, b]).any()
     )
-
-
-def misfit_m(distance: np.ndarray) -> float:
-    """Root mean square of distances from the model, none of them larger than 0.2 m."""
-    near = np.minimum(distance[np.isfinite(distance)], _LARGEST_M)
-    return float(np.sqrt(np.mean(near**2))) if len(near) else 0.0
-
-
-def _order(fit: MarkerFit, exchanges: Sequence[Exchange]) -> np.ndarray:
-    order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
-    for one in exchanges:
-        order[one.frames, [one.a, one.b]] = order[one.frames, [one.b, one.a]]
-    return order
+    pairs: list[tuple[int, int]] = []
+    for apart, a, b in near:
+        if apart < _MIRRORED_M and not {a, b} & {k for pair in pairs for k in pair}:
+            pairs.append((a, b))
+    return pairs
 
 
 # --- the markers of a segment in another order, throughout ----------------------------------------
@@ -151,7 +187,7 @@ _FEWEST, _MOST_MARKERS = 4, 7
 _LIKELY = 8  # orders that are fitted
 
 
-def reordered(labelling: Labelling, refit: Refit) -> Labelling:
+def _reordered(labelling: Labelling) -> Labelling:
     """Labels of segments corrected whose markers are each other's, with the events.
 
     Of labels that are exchanged all together no pair need show it, since the pose follows them.
@@ -160,14 +196,15 @@ def reordered(labelling: Labelling, refit: Refit) -> Labelling:
     these orders it is, of those that are nearly alike.
     """
     fit = labelling.fit
-    frames = some_frames(fit)
+    frames = _some_frames(fit)
     whole, limit = slice(0, len(fit.times_s)), 3**0.5 * float(fit.trusted_m.min())
     for segment in dict.fromkeys(fit.segments):
         mine = np.array([k for k, name in enumerate(fit.segments) if name == segment])
         seen = np.isfinite(fit.measured_m[frames][:, mine, 0]).all(axis=1)
         if not _FEWEST <= len(mine) <= _MOST_MARKERS or not seen.any():
             continue
-        rigid = partial(_rigid_misfits_m, fit.measured_m[frames[seen]][:, mine], fit.place_m[mine])
+        places = fit.person.marker_positions_m[mine]
+        rigid = partial(_rigid_misfits_m, fit.measured_m[frames[seen]][:, mine], places)
         as_labelled = float(rigid(np.arange(len(mine))[None])[0])
         if as_labelled < limit:
             continue
@@ -176,18 +213,16 @@ def reordered(labelling: Labelling, refit: Refit) -> Labelling:
         likely = [k for k in np.argsort(misfits) if misfits[k] < _NEARER * as_labelled][:_LIKELY]
         if not likely:
             continue
-        tried = [
-            [
-                Exchange(a, b, whole, as_labelled / float(misfits[k]))
-                for a, b in _transpositions(mine, orders[k])
-            ]
-            for k in likely
-        ]
-        _, found = best_fitting(fit, refit, tried)
-        again = refitted(fit, refit, found)
-        before, after = (misfit_m(one.distance_m()[:, mine]) for one in (fit, again))
-        if after < _NEARER * before and misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):
-            labelling = _labelled(labelling, again, found, found)
+        tried = []
+        for k in likely:
+            clear = as_labelled / float(misfits[k])
+            steps = _transpositions(mine, orders[k])
+            tried.append([Exchange(a, b, whole, clear) for a, b in steps])
+        _, found = labelling.best_fitting(tried)
+        again = labelling.refitted(found)
+        nearer = again.misfit_m(mine) < _NEARER * fit.misfit_m(mine)
+        if nearer and again.misfit_m() < fit.misfit_m():
+            labelling = labelling.after(again, found, found)
             fit = labelling.fit
     return labelling
 
@@ -217,8 +252,6 @@ def _transpositions(markers: np.ndarray, order: np.ndarray) -> Iterator[tuple[in
 # --- pairs of markers that bear each other's labels for a while or throughout ---------------------
 
 
-_FAR = 3.0  # own residual over the trusted distance and over the trial's median residual
-_NEARER = 0.5  # distance to the other's place over that to the own
 _BRIDGE_S = 0.1  # breaks within one swap
 _UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
 _MOST = 12
@@ -235,7 +268,7 @@ class _Pair:
     reverses: bool
 
 
-def swaps(labelling: Labelling, refit: Refit) -> Labelling:
+def _swaps(labelling: Labelling) -> Labelling:
     """Labels of pairs corrected where that is clear, with the events.
 
     Two signs, and either is enough. The path's: the line between the two reverses from one frame
@@ -255,9 +288,9 @@ def swaps(labelling: Labelling, refit: Refit) -> Labelling:
         unseen = ~np.isfinite(fit.measured_m[:, [pair.a, pair.b], 0]).all(axis=1)
         found = pieces(pair.hit, unseen, 1 + round(_BRIDGE_S / fit.step_s()))
         suspected = [Exchange(pair.a, pair.b, piece, pair.ratio) for piece in found]
-        again = refitted(fit, refit, suspected)
-        if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):
-            labelling = exchanged_back(labelling, again, refit, suspected)
+        again = labelling.refitted(suspected)
+        if again.misfit_m() < fit.misfit_m():
+            labelling = labelling.exchanged_back(again, suspected)
     return labelling
 
 
@@ -290,12 +323,11 @@ def _nearness(fit: MarkerFit, own: np.ndarray, a: int, b: int, frames: np.ndarra
 
 def _pairs(fit: MarkerFit) -> Iterator[tuple[int, int]]:
     """Markers of one segment, of the same one on both sides, or of two that share a joint."""
-    segments, parents = fit.segments, fit.parents
-    for a, first in enumerate(segments):
-        near = {first, mirrored(first), parents.get(first)}
-        for b in range(a + 1, len(segments)):
-            if segments[b] in near or parents.get(segments[b]) == first:
-                yield a, b
+    names, parents = fit.person.skeleton.segments, fit.person.skeleton.parents
+    for (a, first), (b, other) in combinations(enumerate(fit.person.marker_segments), 2):
+        near = other in (first, parents[first]) or parents[other] == first
+        if near or names[other] == mirrored(names[first]):
+            yield a, b
 
 
 def _between_reversals(

@@ -14,14 +14,13 @@ import numpy as np
 from bsip_cli.body.person import Person
 from bsip_cli.motion.calibration import Calibration
 from bsip_cli.motion.inverse_kinematics import (
+    Posed,
     Poses,
-    concatenated,
-    model_markers,
-    pose_columns,
+    marker_trust,
+    posed,
     solve_poses,
     solve_trial,
     subtrees,
-    tree_of,
 )
 from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
@@ -55,17 +54,17 @@ class Refinement:
 
 @dataclass(frozen=True)
 class _Parameter:
-    """One number of the geometry: how it moves markers, and its prior.
+    """One number of the geometry, its prior, and what it moves.
 
     kind: length, joint, origin, parent_tilt, child_tilt, shift or marker. ``index`` is the segment
-    (for joints and tilts the child segment, for markers the marker); ``axis`` 0 to 2 where it has
-    one.
+    (for joints and tilts the child segment, for markers the marker).
+    moves : arrays of the person, entries in them, and by how much these change with it.
     """
 
     kind: str
     index: int
-    axis: int
     sd: float
+    moves: tuple[tuple[str, tuple[int, ...], float], ...]
 
 
 def refine(
@@ -80,7 +79,8 @@ def refine(
     parameters = tuple(_parameters(person, options))
     precision = _prior_precision(person, parameters, options)
     x = np.zeros(len(parameters))
-    fitted, poses = person, _poses(person, markers_m, q, ik)
+    # each frame from its own start: the chosen frames are not neighbours
+    fitted, poses = person, solve_poses(person, markers_m, q, **ik)
     before, cost = poses.rms_m(), _total_cost(poses, fitted, x, precision, options, ik)
     damping = 1e-6
     information, gradient = _reduced_equations(fitted, markers_m, poses, parameters, options, ik)
@@ -90,7 +90,7 @@ def refine(
             hessian + damping * np.diag(np.diag(hessian)), gradient - precision @ x
         )
         trial = _with(person, parameters, x + step)
-        trial_poses = _poses(trial, markers_m, poses.q, ik)
+        trial_poses = solve_poses(trial, markers_m, poses.q, **ik)
         trial_cost = _total_cost(trial_poses, trial, x + step, precision, options, ik)
         if trial_cost > cost:
             damping = max(100 * damping, 1e-3)
@@ -126,12 +126,6 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
     return np.array(sorted(chosen))
 
 
-def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
-    """Each frame from its own start: the chosen frames are not neighbours."""
-    parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
-    return concatenated(parts)
-
-
 def _total_cost(poses, person, x, precision, options, ik) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
     far = np.maximum(d, limit)
@@ -144,7 +138,8 @@ def _total_cost(poses, person, x, precision, options, ik) -> float:
 # --- the parameters ---------------------------------------------------------------------------
 
 
-_ENDS = ("parent", "child")
+_JOINT, _ORIGIN, _MARKER = "joint_in_parent_m", "origin_in_joint_m", "marker_positions_m"
+_TILTS = ("parent_tilt", "child_tilt")
 
 
 def _children(person: Person, segment: int) -> list[int]:
@@ -153,26 +148,33 @@ def _children(person: Person, segment: int) -> list[int]:
 
 def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]:
     """The base keeps its anatomical origin: where the trunk bends on it is a joint of its own."""
-    skeleton = person.skeleton
+    skeleton, joint_sd = person.skeleton, options.joint_centre_sd_m
     for i in range(len(skeleton.segments)):
-        children = _children(person, i)
-        for child in _moving_joints(person, i):
-            yield from _three("joint", child, options.joint_centre_sd_m)
+        children, moving = _children(person, i), _moving_joints(person, i)
+        for child in moving:
+            yield from _three("joint", child, joint_sd, [(_JOINT, child)])
         if children and i > 0 and not _has_free_joints(person, i):
-            yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
+            moves = (("lengths_m", (i,), 1.0), (_JOINT, (children[0], 1), -1.0))
+            yield _Parameter("length", i, options.length_sd * person.lengths_m[i], moves)
         if np.any(person.origin_in_joint_m[i]):
-            yield from _three("origin", i, options.joint_centre_sd_m)
+            yield from _three("origin", i, joint_sd, [(_ORIGIN, i)])
         if skeleton.joint_types[i] == "revolute":
-            yield _Parameter("parent_tilt", i, 0, options.hinge_sd_rad)
-            yield _Parameter("child_tilt", i, 0, options.hinge_sd_rad)
-        if i > 0 and np.any(person.marker_segments == i):
-            yield from _three("shift", i, options.joint_centre_sd_m)
+            for kind in _TILTS:
+                yield _Parameter(kind, i, options.hinge_sd_rad, ((f"{kind}_rad", (i,), 1.0),))
+        own = np.flatnonzero(person.marker_segments == i).tolist()
+        if i > 0 and own:
+            moved = [*((_MARKER, m) for m in own), *((_JOINT, child) for child in moving)]
+            yield from _three("shift", i, joint_sd, moved)
     for m in range(len(person.markers)):
-        yield from _three("marker", m, options.marker_sd_m)
+        yield from _three("marker", m, options.marker_sd_m, [(_MARKER, m)])
 
 
-def _three(kind: str, index: int, sd: float) -> Iterator[_Parameter]:
-    return (_Parameter(kind, index, axis, sd) for axis in range(3))
+def _three(
+    kind: str, index: int, sd: float, moved: Sequence[tuple[str, int]]
+) -> Iterator[_Parameter]:
+    """Along each axis."""
+    for axis in range(3):
+        yield _Parameter(kind, index, sd, tuple((name, (k, axis), 1.0) for name, k in moved))
 
 
 def _has_free_joints(person: Person, segment: int) -> bool:
@@ -207,39 +209,18 @@ def _prior_precision(
 
 def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:
     """The person with the parameters' changes ``x`` added to the first guess."""
-    joints, origins = person.joint_in_parent_m.copy(), person.origin_in_joint_m.copy()
-    tilts = {f"{one}_tilt_rad": getattr(person, f"{one}_tilt_rad").copy() for one in _ENDS}
-    places, lengths = person.marker_positions_m.copy(), person.lengths_m.copy()
+    names = (_JOINT, _ORIGIN, _MARKER, "lengths_m", *(f"{kind}_rad" for kind in _TILTS))
+    arrays = {name: getattr(person, name).copy() for name in names}
     for parameter, value in zip(parameters, x, strict=True):
-        i, axis = parameter.index, parameter.axis
-        if parameter.kind == "length":
-            lengths[i] += value
-            joints[_children(person, i)[0], 1] -= value
-        elif parameter.kind == "origin":
-            origins[i, axis] += value
-        elif parameter.kind == "joint":
-            joints[i, axis] += value
-        elif f"{parameter.kind}_rad" in tilts:
-            tilts[f"{parameter.kind}_rad"][i] += value
-        elif parameter.kind == "shift":
-            places[person.marker_segments == i, axis] += value
-            for child in _moving_joints(person, i):
-                joints[child, axis] += value
-        else:
-            places[i, axis] += value
+        for name, at, factor in parameter.moves:
+            arrays[name][at] += factor * value
+    joints, lengths = arrays[_JOINT], arrays["lengths_m"]
     hips = [c for c in _children(person, 0) if np.any(person.joint_in_parent_m[c])]
     if hips:  # the pelvis is as long as its origin is from the hips' middle
         lengths[0] = float(np.hypot(*joints[hips].mean(axis=0)[:2]))
     for rod in set(range(len(lengths))) - set(person.skeleton.bodies):
         lengths[rod] = np.linalg.norm(joints[_children(person, rod)[0]])
-    return replace(
-        person,
-        joint_in_parent_m=joints,
-        origin_in_joint_m=origins,
-        lengths_m=lengths,
-        marker_positions_m=places,
-        **tilts,
-    )
+    return replace(person, **arrays)
 
 
 # --- the equations ----------------------------------------------------------------------------
@@ -254,25 +235,19 @@ def _reduced_equations(
     ik: dict,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information (P, P) and gradient (P,) of the geometry with all poses eliminated."""
-    tree = tree_of(person)
-    R, p = tree.forward(poses.q)
-    model = model_markers(person, R, p)
+    at, below = posed(person, poses.q), subtrees(person)
     # weights [1/m2], less beyond the robust limit; zero where missing
-    distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
-    trust = np.minimum(1.0, ik["robust_limit_m"] / np.maximum(distance, 1e-12)) ** 2
+    trust = marker_trust(poses.residual_m[..., None], ik["robust_limit_m"])
     base = person.marker_weights / ik["marker_sd_m"] ** 2
     root = np.sqrt(trust * base * min(1.0, options.independent_frames / len(poses.q)))[..., None]
-    residual = np.where(root > 0, (markers_m - model) * root, 0.0)
-    below = subtrees(person)
-    by_pose = pose_columns(tree, R, p, model, below) * root[..., None]
-    each = [_column(parameter, person, R, p, model, below) for parameter in parameters]
-    by_parameter = np.stack(each, axis=-1) * root[..., None]
-    frames = len(R)
-    Jq = by_pose.reshape(frames, -1, tree.nv)
-    Jp = by_parameter.reshape(frames, -1, len(parameters))
+    residual = np.where(root > 0, (markers_m - at.markers_m) * root, 0.0)
+    by_parameter = np.stack([_column(one, at, below) for one in parameters], axis=-1)
+    frames, nv = len(poses.q), len(person.skeleton.v_names)
+    Jq = (at.columns() * root[..., None]).reshape(frames, -1, nv)
+    Jp = (by_parameter * root[..., None]).reshape(frames, -1, len(parameters))
     r = residual.reshape(frames, -1)
     A = np.einsum("fki,fkj->fij", Jq, Jq, optimize=True)
-    A += np.eye(tree.nv) * max(ik["posture_sd_rad"] ** -2, 1e-9)
+    A += np.eye(nv) * max(ik["posture_sd_rad"] ** -2, 1e-9)
     B = np.matmul(Jq.transpose(0, 2, 1), Jp)
     C = np.linalg.solve(A, B)
     flat = Jp.reshape(-1, Jp.shape[2])
@@ -282,26 +257,20 @@ def _reduced_equations(
     return information, gradient
 
 
-def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.ndarray:
-    """(N, m, 3) motion of the model's markers for a unit change of one parameter."""
-    column = np.zeros_like(model)
-    i, axis, parents = parameter.index, parameter.axis, person.skeleton.parents
-    if parameter.kind == "length":
-        column[:, below[_children(person, i)[0]]] = -R[:, None, i, :, 1]
-    elif parameter.kind == "origin":
-        column[:, below[i]] = R[:, None, i, :, axis]
-    elif parameter.kind == "joint":
-        column[:, below[i]] = R[:, None, parents[i], :, axis]
-    elif parameter.kind in ("parent_tilt", "child_tilt"):
-        turning = R[:, parents[i], :, 0] if parameter.kind == "parent_tilt" else -R[:, i, :, 0]
-        column[:, below[i]] = np.cross(turning[:, None], model[:, below[i]] - p[:, None, i])
-    elif parameter.kind == "shift":
-        own = person.marker_segments == i
-        for child in _moving_joints(person, i):
-            own = own | below[child]
-        column[:, own] = R[:, None, i, :, axis]
-    else:
-        column[:, i] = R[:, person.marker_segments[i], :, axis]
+def _column(parameter: _Parameter, at: Posed, below: np.ndarray) -> np.ndarray:
+    """(N, m, 3) motion of the model's markers for a unit change of one parameter; ``below`` (n, m)
+    as of :func:`subtrees`."""
+    column, R, parents = np.zeros_like(at.markers_m), at.R, at.person.skeleton.parents
+    for name, (i, *axis), factor in parameter.moves:
+        if name == _MARKER:
+            column[:, i] += factor * R[:, at.person.marker_segments[i], :, axis[0]]
+        elif name in (_JOINT, _ORIGIN):
+            carrier = parents[i] if name == _JOINT else i
+            column[:, below[i]] += factor * R[:, None, carrier, :, axis[0]]
+        elif name != "lengths_m":  # which moves the joint, too
+            turning = R[:, parents[i], :, 0] if name == "parent_tilt_rad" else -R[:, i, :, 0]
+            arms = at.markers_m[:, below[i]] - at.p[:, None, i]
+            column[:, below[i]] += np.cross(turning[:, None], arms)
     return column
 
 
@@ -357,8 +326,7 @@ def refine_over_trials(
         poses = [solve_poses(person, standing.markers_m, calibration.q, **ik).q]
         poses += [solve_trial(person, one, **ik).q for one in markers[1:]]
         all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
-        orientations, _ = tree_of(person).forward(all_poses)
-        chosen = varied_frames(orientations, frames)
+        chosen = varied_frames(posed(person, all_poses).R, frames)
         return refine(person, all_markers[chosen], all_poses[chosen], options, ik)
 
     fit = refined(standing, seen)

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt, welch
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.inverse_kinematics import coordinate_covariance, marker_residuals
+from bsip_cli.motion.inverse_kinematics import coordinate_covariance, posed
 from bsip_cli.motion.splines import SkinNoise, SmoothSignal, bridged, noise_level, smooth
 
 # --- how much the skin swings against the bones, from the residuals of the inverse kinematics -----
@@ -44,7 +44,7 @@ def skin_corner_hz(
     white_m : the markers' white noise, each direction.
     robust_limit_m : beyond it a marker's pull on the poses fades.
     """
-    residuals = marker_residuals(person, q, markers)
+    residuals = posed(person, q).residuals(markers)
     distance = np.linalg.norm(residuals, axis=2, keepdims=True)
     weight = np.minimum(1.0, robust_limit_m / np.maximum(distance, 1e-12)) ** 2
     pull = residuals * weight / np.nanmean(weight)  # as the poses feel them
@@ -168,8 +168,7 @@ def _noise(
         some[:, part] /= np.linalg.norm(some[:, part], axis=1, keepdims=True)
     unit = coordinate_covariance(person, some, _WEAK_PRIOR).mean(axis=0)
     seen = noise_level(curves, rate_hz)
-    blocks = list(_blocks(skeleton))
-    variance = np.diag(unit)
+    blocks, variance = list(_blocks(skeleton)), np.diag(unit)
     spread = [np.sqrt(variance[turning].sum() / count) / k for _, turning, count, k in blocks]
     predicted = np.array(spread)
     found = np.array([np.sqrt((seen[part] ** 2).mean()) for part, *_ in blocks])

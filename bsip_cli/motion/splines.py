@@ -15,7 +15,6 @@ differences next to the one on the fourth.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -68,14 +67,6 @@ class SkinNoise:
     from_hz: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Penalty:
-    """Weights of the squared fourth (n - 4,) and second differences of n coefficients."""
-
-    fourth: np.ndarray
-    second: float
-
-
 def smooth(
     samples: np.ndarray,
     rate_hz: float,
@@ -105,14 +96,13 @@ def smooth(
     for k in range(samples.shape[1]):
         groups.setdefault(seen[:, k].tobytes(), []).append(k)
     first = max(groups.values(), key=lambda columns: seen[:, columns[0]].sum())
-    penalty = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
+    fourth, second = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
     # The skin's part has as much power at all frequencies that pass: the value's variance times it.
-    skins = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
+    skins = second / fourth[basis.knot_of_sample] * basis.per_s**4
     for columns in groups.values():
-        weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
-        right = basis.values.T @ (weights[:, None] * scaled[:, columns])
-        c[:, columns], inverse = _fit(_normal(basis, weights), penalty, right)
+        equations = _equations(basis, scaled[:, columns], seen[:, columns[0]])
+        c[:, columns], inverse = _fit(*equations, fourth, second)
         white = _variances(basis.curves, inverse)
         of_curve = np.sqrt(white + skins * _variances(basis.values, inverse))
         spread[:, columns] = np.outer(of_curve, sigma[columns])
@@ -122,7 +112,7 @@ def smooth(
         basis.slopes @ c,
         basis.curves @ c,
         spread,
-        _cutoff_hz(basis, penalty),
+        _cutoff_hz(basis, fourth, second),
     )
 
 
@@ -194,6 +184,8 @@ class _Basis:
             )
             matrices.append(sparse.csr_array(basis @ differences) * self.per_s**order)
         self.values, self.slopes, self.curves = matrices
+        # (N,) fourth difference that is centred on each sample
+        self.knot_of_sample = np.clip(np.round(self.x).astype(int), 0, self.size - 5)
 
     def power(self, omega: np.ndarray) -> np.ndarray:
         """Gain of B^T B far from the ends at these frequencies (radians per knot)."""
@@ -203,27 +195,19 @@ class _Basis:
         products = [np.nansum(spline(x) * spline(x - shift)) for shift in k]
         return np.cos(np.outer(omega, k)) @ np.array(products)
 
-    @cached_property
-    def knot_of_sample(self) -> np.ndarray:
-        """(N,) fourth difference that is centred on each sample."""
-        return np.clip(np.round(self.x).astype(int), 0, self.size - 5)
-
 
 def _penalty(
     y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis, skin: SkinNoise | None
-) -> _Penalty:
-    """The penalty that the channels y (N, channels) share; y in units of its white noise.
+) -> tuple[np.ndarray, float]:
+    """Weights of the squared fourth (n - 4,) and second differences of n coefficients, which the
+    channels y (N, channels) share; y in units of its white noise.
 
     All channels share one: where each has its own, the errors of pelvis and legs no longer cancel
     and a planted foot accelerates.
     """
-    weights = np.where(seen, 1.0, _BRIDGE_WEIGHT)
-    right = basis.values.T @ (weights[:, None] * y)
-    normal = _normal(basis, weights)
-    stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
-    penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
+    equations, stiffness = _equations(basis, y, seen), np.full(basis.size - 4, _FIRST_STIFFNESS)
     for _ in range(_ROUNDS):
-        c, inverse = _fit(normal, penalty, right)
+        c, inverse = _fit(*equations, stiffness, _skin_share(stiffness, basis, skin))
         leverage = seen * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
         n = len(c) - 4  # pace: mean square over the channels of the fourth differences
@@ -232,10 +216,9 @@ def _penalty(
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
         converged = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
-        penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
         if converged:
             break
-    return penalty
+    return stiffness, _skin_share(stiffness, basis, skin)
 
 
 def _skin_share(stiffness: np.ndarray, basis: _Basis, skin: SkinNoise | None) -> float:
@@ -247,37 +230,38 @@ def _skin_share(stiffness: np.ndarray, basis: _Basis, skin: SkinNoise | None) ->
     return min(share, basis.samples_per_knot / lowest**4)
 
 
-def _cutoff_hz(basis: _Basis, penalty: _Penalty) -> np.ndarray:
+def _cutoff_hz(basis: _Basis, fourth: np.ndarray, second: float) -> np.ndarray:
     """(N,) frequency at which the gain of the spline, were its stiffness constant, is one half."""
     omega = np.linspace(0.0, np.pi, _FREQUENCIES + 1)[1:]
     difference = 2 * np.sin(0.5 * omega)
     signal = basis.power(omega)
-    stiffness = (signal - penalty.second * difference**4) / difference**8
+    stiffness = (signal - second * difference**4) / difference**8
     falling = stiffness > 0.0  # beyond, the second differences alone leave less than half
-    hz = np.interp(
-        -np.log(penalty.fourth), -np.log(stiffness[falling]), omega[falling] * basis.per_s
-    ) / (2 * np.pi)
+    hz = np.interp(-np.log(fourth), -np.log(stiffness[falling]), omega[falling] * basis.per_s) / (
+        2 * np.pi
+    )
     return hz[basis.knot_of_sample]
 
 
-def _normal(basis: _Basis, weights: np.ndarray) -> np.ndarray:
-    """(6, n) lower band of B^T diag(weights) B."""
-    matrix = basis.values.T @ (basis.values * weights[:, None])
-    band = np.zeros((_DEGREE + 1, matrix.shape[0]))
+def _equations(basis: _Basis, y: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(6, n) lower band of B^T W B and (n, channels) B^T W y; weights W by which samples (N,) are
+    seen."""
+    weights = np.where(seen, 1.0, _BRIDGE_WEIGHT)[:, None]
+    matrix = basis.values.T @ (basis.values * weights)
+    band = np.zeros((_DEGREE + 1, basis.size))
     for k in range(_DEGREE + 1):
-        band[k, : matrix.shape[0] - k] = matrix.diagonal(-k)
-    return band
+        band[k, : basis.size - k] = matrix.diagonal(-k)
+    return band, basis.values.T @ (weights * y)
 
 
 def _mean(x: np.ndarray, window: int) -> np.ndarray:
     return uniform_filter1d(x, window, mode="nearest")
 
 
-def _fit(normal: np.ndarray, penalty: _Penalty, right: np.ndarray):
+def _fit(normal: np.ndarray, right: np.ndarray, fourth: np.ndarray, second: float):
     """Coefficients and the band of the posterior covariance over sigma^2."""
-    matrix = normal.copy()
-    second = np.full(normal.shape[1] - 2, penalty.second)
-    for signs, weights in ((_FOURTH, penalty.fourth), (_SECOND, second)):
+    matrix, seconds = normal.copy(), np.full(normal.shape[1] - 2, second)
+    for signs, weights in ((_FOURTH, fourth), (_SECOND, seconds)):
         for a, b in combinations_with_replacement(range(len(signs)), 2):
             matrix[b - a, a : a + len(weights)] += signs[a] * signs[b] * weights
     factor = cholesky_banded(matrix, lower=True)

@@ -13,7 +13,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
 from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
-from bsip_cli.motion.inverse_kinematics import marker_residuals
+from bsip_cli.motion.inverse_kinematics import posed
 from bsip_cli.recordings.plate_wrench import silent_frames
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import (
@@ -51,7 +51,7 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
         replace(p, zeroed=p.name in zeros, silent=silent_frames(p.wrench, resampled))
         for p in plates
     )
-    limit_m, residual_m = unit.config.ik.robust_limit_m, marker_residuals(person, scene.q, markers)
+    limit_m, residual_m = unit.config.ik.robust_limit_m, posed(person, scene.q).residuals(markers)
     return replace(scene, plates=plates, robust_limit_m=limit_m, residual_m=residual_m)
 
 

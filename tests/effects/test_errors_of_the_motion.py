@@ -21,7 +21,7 @@ from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
 from bsip_cli.effects.joints import BELOW, JointCentre, MissingJoint
 from bsip_cli.effects.markers import CORNER, MarkerShift, MarkerSwap, OverSmoothing, step
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.inverse_kinematics import marker_residuals, solve_trial
+from bsip_cli.motion.inverse_kinematics import posed, solve_trial
 from tests.body.standing_person import markers_of, standing
 from tests.effects.moving_scene import (
     RATE_HZ,
@@ -49,7 +49,7 @@ def followed(markers: np.ndarray, limit_m: float = 1.0, smooth_s: float = 0.0) -
     q = solve_trial(PERSON, markers, robust_limit_m=limit_m, **OPTIONS).q
     if smooth_s:
         q = smoothed(q, smooth_s)
-    residual = marker_residuals(PERSON, q, markers)
+    residual = posed(PERSON, q).residuals(markers)
     return scene_of(q, *derivatives(q), residual_m=residual, robust_limit_m=limit_m)
 
 

@@ -9,7 +9,7 @@ from bsip_cli.effects.body import WobblingMass
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.nameless import NAMELESS
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.inverse_kinematics import marker_residuals
+from bsip_cli.motion.inverse_kinematics import posed
 from tests.body.standing_person import standing
 from tests.effects.moving_scene import moving, some, values_of
 
@@ -30,7 +30,7 @@ def scene_with_swapped_markers() -> Scene:
     seen = scene.markers_m.copy()
     a, b = names.index("RKNEM"), names.index("LKNEM")
     seen[200:320, [a, b]] = seen[200:320, [b, a]]
-    residual = marker_residuals(scene.person, scene.q, seen)
+    residual = posed(scene.person, scene.q).residuals(seen)
     return replace(scene, residual_m=residual, robust_limit_m=0.025)
 
 

@@ -11,15 +11,20 @@ from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.effects.markers import during, step
 from bsip_cli.effects.scene import without_fast
 from bsip_cli.motion.inverse_kinematics import (
-    marker_residuals,
+    PoseResponse,
     marker_trust,
-    pose_responses,
+    posed,
     solve_trial,
 )
 from tests.body.standing_person import away, markers_of, standing
 from tests.effects.moving_scene import derivatives, moving, rms, scene_of
 
 PERSON = standing().person
+
+
+def response_at(q: np.ndarray, trust: np.ndarray | float = 1.0) -> PoseResponse:
+    weights = np.tile(PERSON.marker_weights, (len(q), 1))
+    return PoseResponse(PERSON, q, trust * weights)
 
 
 def some_errors(k: int = 1) -> np.ndarray:
@@ -50,10 +55,8 @@ def test_some_markers_are_all_markers_without_error():
     q, chosen = moving().q[::50], [3, 20]
     errors = np.zeros((len(q), len(PERSON.markers), 3, 2))
     errors[:, chosen] = 1e-3 * np.random.default_rng(6).normal(size=(len(q), 2, 3, 2))
-    response = pose_responses(PERSON, q)
-    np.testing.assert_allclose(
-        response.of(errors[:, chosen], chosen), pose_responses(PERSON, q).of(errors)
-    )
+    response = response_at(q)
+    np.testing.assert_allclose(response.of(errors[:, chosen], chosen), response_at(q).of(errors))
     np.testing.assert_allclose(response.left(errors[:, chosen], chosen), response.left(errors))
 
 
@@ -71,12 +74,12 @@ def test_a_marker_beyond_the_limit_pulls_as_little_as_in_the_robust_fit():
         iterations=60,
     ).q
     exact = np.stack([away(PERSON, a, b) for a, b in zip(q, solved, strict=True)])
-    residual = marker_residuals(PERSON, solved, markers)
+    residual = posed(PERSON, solved).residuals(markers)
     trust = marker_trust(residual, limit)
     assert trust[:, m].mean() < 0.6
     errors = np.tile([0.03, 0.05, 0.0], (len(q), 1))[:, None, :, None]
-    linear = pose_responses(PERSON, solved, trust).of(errors, [m])[..., 0]
-    trusting = pose_responses(PERSON, solved).of(errors, [m])[..., 0]
+    linear = response_at(solved, trust).of(errors, [m])[..., 0]
+    trusting = response_at(solved).of(errors, [m])[..., 0]
     off = np.sqrt(((linear - exact) ** 2).mean())
     assert off < 0.15 * np.sqrt((exact**2).mean())
     assert np.sqrt(((trusting - exact) ** 2).mean()) > 4 * off
@@ -96,7 +99,7 @@ def test_a_frame_without_markers_stays_where_it_is():
     q = moving().q[::100]
     trust = np.ones((len(q), len(PERSON.markers)))
     trust[2] = 0.0
-    moved = pose_responses(PERSON, q, trust).of(np.full((*trust.shape, 3, 1), 0.01))
+    moved = response_at(q, trust).of(np.full((*trust.shape, 3, 1), 0.01))
     assert np.abs(moved[2]).max() == 0.0
     assert np.abs(moved[1]).max() > 0.005
 

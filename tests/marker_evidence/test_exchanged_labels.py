@@ -10,10 +10,7 @@ import pytest
 from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_exchange import (
     Exchange,
-    as_recorded,
-    exchanged_back,
-    misfit_m,
-    refitted,
+    Labelling,
 )
 from tests.marker_evidence.swinging_markers import (
     MARKERS,
@@ -36,7 +33,7 @@ def judged(markers: np.ndarray, times: np.ndarray, filled: np.ndarray | None = N
 
 
 def misfit_of(markers: np.ndarray, times: np.ndarray) -> float:
-    return misfit_m(fitted(markers, times).distance_m())
+    return fitted(markers, times).misfit_m()
 
 
 @pytest.mark.parametrize(
@@ -171,8 +168,8 @@ def suspected(farther: str, factor: float):
         residual[frames, m] = factor * fit.residual_m[frames, m]
         return replace(again, residual_m=residual)
 
-    one = [Exchange(a, b, frames, 9.0)]
-    return exchanged_back(as_recorded(fit), refitted(fit, refit, one), refit, one), fit
+    one, labelling = [Exchange(a, b, frames, 9.0)], Labelling(fit, refit)
+    return labelling.exchanged_back(labelling.refitted(one), one), fit
 
 
 @pytest.mark.parametrize("label", ["RKNEL", "RKNEM"])
@@ -182,13 +179,13 @@ def test_a_swap_that_leaves_one_of_the_two_farther_off_is_only_reported(label):
     assert not event.put_right
     assert event.sentence.endswith("; not clear enough to correct, left as recorded")
     assert labelling.fit is fit
-    assert np.array_equal(labelling.order, as_recorded(fit).order)
+    assert np.array_equal(labelling.order, Labelling(fit, fitted).order)
 
 
 def test_a_swap_that_brings_both_nearer_is_undone():
     labelling, fit = suspected("RKNEL", 0.5)
     assert labelling.events[0].put_right
-    assert (labelling.order != as_recorded(fit).order).sum() == 2 * 45
+    assert (labelling.order != Labelling(fit, fitted).order).sum() == 2 * 45
 
 
 def test_a_swap_after_which_all_markers_fit_worse_is_not_undone():
@@ -198,6 +195,6 @@ def test_a_swap_after_which_all_markers_fit_worse_is_not_undone():
     near = replace(fit, residual_m=a_worse_fit.residual_m.copy())
     near.residual_m[:40, :2] = 0.0
     near.residual_m[40:] += 0.01
-    labelling = exchanged_back(as_recorded(a_worse_fit), near, lambda m, t: near, one)
+    labelling = Labelling(a_worse_fit, lambda m, t: near).exchanged_back(near, one)
     assert not labelling.events[0].put_right
     assert labelling.fit is a_worse_fit

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.motion.inverse_kinematics import solve_poses, tree_of
-from bsip_cli.motion.marker_fit import best_source, marker_fit
+from bsip_cli.motion.inverse_kinematics import posed, solve_poses
+from bsip_cli.motion.marker_fit import marker_fit
 from tests.body.standing_person import markers_of, random_poses
 from tests.marker_evidence.swinging_markers import MARKERS, PERSON, SCALES, fitted
 
@@ -15,7 +15,7 @@ from tests.marker_evidence.swinging_markers import MARKERS, PERSON, SCALES, fitt
 def test_residuals_follow_a_moved_marker_as_the_response_says(label):
     q = random_poses(PERSON, 1, 0.2, seed=3)
     markers, m = markers_of(PERSON, q), MARKERS.index(label)
-    turn = tree_of(PERSON).forward(q)[0][0, PERSON.marker_segments[m]]
+    turn = posed(PERSON, q).turns()[0, m]
     move = np.array([0.001, -0.002, 0.001])
     moved = markers.copy()
     moved[0, m] += turn @ move
@@ -45,6 +45,6 @@ def test_the_source_of_a_field_is_named_with_its_size():
     field = fit.response[:, :, m] @ move
     assert np.linalg.norm(field[m]) < 0.8 * np.linalg.norm(move)  # the pose takes its part
     everyone = list(range(len(MARKERS)))
-    found, vector = best_source(fit.response, field, np.full(len(MARKERS), 5e-4), everyone)
+    found, vector, _ = fit.source_of(field, np.full(len(MARKERS), 5e-4), everyone)
     assert found == m
     assert np.linalg.norm(vector - move) < 0.002

@@ -10,10 +10,9 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.motion.inverse_kinematics import (
     coordinate_covariance,
     first_pose,
-    model_markers,
     neutral,
     place_base,
-    pose_columns,
+    posed,
     solve_poses,
     solve_trial,
     subtrees,
@@ -42,10 +41,10 @@ def person():
 
 def test_forward_kinematics_equals_pinocchio(tilted):
     q = random_poses(tilted, 40, 1.0, seed=1)
-    R, p = tree_of(tilted).forward(q)
+    at = posed(tilted, q)
     expected_R, expected_p = joint_frames(tilted, q)
-    np.testing.assert_allclose(R, expected_R, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(p, expected_p, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(at.R, expected_R, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(at.p, expected_p, rtol=0, atol=1e-12)
 
 
 def test_neutral_is_pinocchios(tilted):
@@ -61,13 +60,12 @@ def test_parents_of_velocities_follow_the_tree(tilted):
         last = -1 if parent == 0 else model.joints[parent].idx_v + model.joints[parent].nv - 1
         start = model.joints[j].idx_v
         expected += [last, *range(start, start + model.joints[j].nv - 1)]
-    assert tree.arrays.v_parents.tolist() == expected
+    assert tree.v_parents.tolist() == expected
 
 
 def test_model_markers_equal_pinocchios_placements(tilted):
     q = random_poses(tilted, 5, 0.8, seed=2)
-    R, p = tree_of(tilted).forward(q)
-    np.testing.assert_allclose(model_markers(tilted, R, p), markers_of(tilted, q), atol=1e-12)
+    np.testing.assert_allclose(posed(tilted, q).markers_m, markers_of(tilted, q), atol=1e-12)
 
 
 def test_the_calibrated_pose_shows_the_static_markers():
@@ -87,13 +85,11 @@ def test_subtrees_are_the_markers_that_move_with_a_joint(tilted):
 
 
 def test_pose_columns_equal_finite_differences(tilted):
-    model, tree = pinocchio_model(tilted), tree_of(tilted)
-    q = random_poses(tilted, 3, 0.8, seed=3)
-    R, p = tree.forward(q)
-    columns = pose_columns(tree, R, p, model_markers(tilted, R, p), subtrees(tilted))
+    model, q = pinocchio_model(tilted), random_poses(tilted, 3, 0.8, seed=3)
+    columns = posed(tilted, q).columns()
     h = 1e-5
-    for k in range(tree.nv):
-        step = h * np.eye(tree.nv)[k]
+    for k in range(model.nv):
+        step = h * np.eye(model.nv)[k]
         ahead = markers_of(tilted, np.stack([pin.integrate(model, one, step) for one in q]))
         back = markers_of(tilted, np.stack([pin.integrate(model, one, -step) for one in q]))
         np.testing.assert_allclose(columns[..., k], (ahead - back) / (2 * h), atol=1e-8)

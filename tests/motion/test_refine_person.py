@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.motion.inverse_kinematics import model_markers, solve_poses, subtrees, tree_of
+from bsip_cli.motion.inverse_kinematics import posed, solve_poses, subtrees
 from bsip_cli.motion.scaling import (
     ScalingOptions,
     _column,
@@ -46,8 +46,7 @@ def test_columns_equal_finite_differences(kind, girdle):
     person = tilted_person(girdle)
     parameters = tuple(_parameters(person, LOOSE))
     q = random_poses(person, 3, 0.7, seed=1)
-    R, p = tree_of(person).forward(q)
-    model, below = model_markers(person, R, p), subtrees(person)
+    at, below = posed(person, q), subtrees(person)
     h = 1e-5
     checked = 0
     for k, parameter in enumerate(parameters):
@@ -57,7 +56,7 @@ def test_columns_equal_finite_differences(kind, girdle):
         ahead = markers_of(_with(person, parameters, step), q)
         back = markers_of(_with(person, parameters, -step), q)
         expected = (ahead - back) / (2 * h)
-        found = _column(parameter, person, R, p, model, below)
+        found = _column(parameter, at, below)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6, err_msg=str(parameter))
         assert np.abs(expected).max() > 1e-3
         checked += 1

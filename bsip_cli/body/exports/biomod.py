@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bsip_cli.body.exports.identified import BALL_AXES, IdentifiedPerson, numbers
+from bsip_cli.body.exports.identified import BALL_AXES, BodyOnJoint, IdentifiedPerson, numbers
 from bsip_cli.body.gravity import GRAVITY_M_S2
 
 
@@ -16,28 +16,22 @@ def biomod_text(body: IdentifiedPerson) -> str:
     lines = ["version 4", *(f"// {line}" for line in body.said("biomod")), ""]
     lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
     lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
-    for i in range(len(body.person.skeleton.segments)):
-        lines += [*_segment_lines(body, i), ""]
+    for one in body.tree():
+        lines += [*_segment_lines(one), ""]
     for name, segment, place in body.markers():
-        parent = body.person.skeleton.segments[segment]
-        lines += [f"marker {name}", f"    parent {parent}"]
+        lines += [f"marker {name}", f"    parent {segment}"]
         lines += [f"    position {numbers(place)}", "endmarker"]
     return "\n".join(lines)
 
 
-def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
+def _segment_lines(one: BodyOnJoint) -> Iterator[str]:
     """A hinge takes two: one that turns, and one that leans back to the segment's axes."""
-    person = body.person
-    skeleton = person.skeleton
-    kind, segment = skeleton.joint_types[i], skeleton.segments[i]
-    parent = skeleton.segments[skeleton.parents[i]] if i else "base"
-    position = person.joint_positions_m()[i]
-    parts = [(segment, parent, np.pi / 2 if kind == "free" else 0.0, position, BALL_AXES)]
-    if kind == "revolute":
-        hinge = skeleton.joints[i]
+    parent, tilt = one.parent or "base", np.pi / 2 if one.kind == "free" else 0.0
+    parts = [(one.segment, parent, tilt, one.place_m, BALL_AXES)]
+    if one.kind == "revolute":
         parts = [
-            (hinge, parent, person.parent_tilt_rad[i], position, "z"),
-            (segment, hinge, -person.child_tilt_rad[i], np.zeros(3), ""),
+            (one.joint, parent, one.parent_tilt_rad, one.place_m, "z"),
+            (one.segment, one.joint, -one.child_tilt_rad, np.zeros(3), ""),
         ]
     for name, above, tilt, place, rotations in parts:
         yield f"segment {name}"
@@ -45,13 +39,12 @@ def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
         yield f"    RT {numbers([tilt, 0, 0])} xyz {numbers(place)}"
         if rotations:
             yield f"    rotations {rotations}"
-        if name == segment:
-            inertia = body.in_joint(i)
-            yield f"    mass {numbers([inertia.mass_kg])}"
+        if name == one.segment:
+            yield f"    mass {numbers([one.inertia.mass_kg])}"
             yield "    inertia"
-            for row in inertia.tensor_kgm2:
+            for row in one.inertia.tensor_kgm2:
                 yield f"        {numbers(row)}"
-            yield f"    com {numbers(inertia.com_m)}"
+            yield f"    com {numbers(one.inertia.com_m)}"
         else:
             yield "    mass 0"
         yield "endsegment"

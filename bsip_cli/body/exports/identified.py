@@ -19,12 +19,35 @@ from bsip_cli.files.regular import read_toml
 # Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
 # (ISB); the two other axes coincide only with the middle angle at 90 degrees.
 BALL_AXES = "zxy"
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @cache
 def export_words() -> dict:
     """Of configs/exports.toml."""
     return read_toml(shipped("exports.toml"))
+
+
+@dataclass(frozen=True, eq=False)
+class BodyOnJoint:
+    """A segment and the joint that it hangs on, as the formats write them.
+
+    parent : the segment that carries the joint; empty for the free base.
+    place_m : (3,) joint centre as seen from the parent's joint, parent axes.
+    parent_tilt_rad, child_tilt_rad : how a hinge leans about X, as of :class:`Person`.
+    axis : (3,) of a hinge, in the segment.
+    inertia : as seen from the joint centre, segment axes; zeros without mass.
+    """
+
+    segment: str
+    parent: str
+    joint: str
+    kind: str
+    place_m: np.ndarray
+    parent_tilt_rad: float
+    child_tilt_rad: float
+    axis: np.ndarray
+    inertia: Inertia
 
 
 @dataclass(frozen=True)
@@ -60,6 +83,16 @@ class IdentifiedPerson:
             return Inertia(0.0, np.zeros(3), np.zeros((3, 3)))
         return self.inertias[bodies.index(i)].moved(-self.person.origin_in_joint_m[i])
 
+    def tree(self) -> Iterator[BodyOnJoint]:
+        """All segments, every parent before its children."""
+        person, skeleton = self.person, self.person.skeleton
+        parents = [skeleton.segments[i] if i >= 0 else "" for i in skeleton.parents]
+        names = (skeleton.segments, parents, skeleton.joints, skeleton.joint_types)
+        tilts = (person.parent_tilt_rad, person.child_tilt_rad)
+        inertias = map(self.in_joint, range(len(parents)))
+        places, axes = person.joint_positions_m(), person.hinge_axes()
+        return map(BodyOnJoint, *names, places, *tilts, axes, inertias)
+
     def check_bodies(self) -> None:
         """Simulators take real bodies only.
 
@@ -91,14 +124,15 @@ class IdentifiedPerson:
             said.append(f"{name}: impossible tensor replaced by the nearest, {away}")
         return replace(self, inertias=tuple(inertias), made_of=(*self.made_of, *said))
 
-    def markers(self) -> Iterator[tuple[str, int, np.ndarray]]:
-        """Plain name, segment and place (3,) in the segment's joint [m] of each.
+    def markers(self) -> Iterator[tuple[str, str, np.ndarray]]:
+        """Plain name, segment's name and place (3,) in the segment's joint [m] of each.
 
         BadDataError: two markers would have one name.
         """
         person = self.person
         names, places = plain_names(person.markers), person.markers_in_joint_m()
-        return zip(names, person.marker_segments.tolist(), places, strict=True)
+        segments = [person.skeleton.segments[i] for i in person.marker_segments]
+        return zip(names, segments, places, strict=True)
 
     def height_of_base_m(self) -> float:
         """How high the base joint stands in the neutral pose over the lowest marker or joint."""
@@ -125,6 +159,13 @@ def neutral_pose(person: Person) -> tuple[np.ndarray, np.ndarray]:
 def numbers(values: Iterable[float]) -> str:
     """Numbers separated by blanks, with all their digits."""
     return " ".join(f"{value:.17g}" for value in np.asarray(values, dtype=float).ravel())
+
+
+def xml_document(tag: str, said: Iterable[str], **attributes: str) -> ET.Element:
+    """The root of a document that begins with a comment."""
+    root = ET.Element(tag, attributes)
+    root.append(ET.Comment(xml_comment(said)))
+    return root
 
 
 def xml_text(root: ET.Element, declared: bool = True) -> str:

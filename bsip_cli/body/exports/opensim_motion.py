@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.identified import xml_comment, xml_text
+from bsip_cli.body.exports.identified import xml_document, xml_text
 from bsip_cli.body.exports.osim import COORDINATES, add_texts
 from bsip_cli.body.skeleton import Skeleton
 
@@ -83,7 +83,7 @@ def mot_text(
 
 def loads_xml(segments: Sequence[str], data_file: str, said: Sequence[str]) -> str:
     """``ExternalLoads`` on the segments from the columns of `loads`."""
-    document = _document(said)
+    document = xml_document("OpenSimDocument", said, Version="40000")
     top = ET.SubElement(document, "ExternalLoads", name="externalloads")
     objects = ET.SubElement(top, "objects")
     for segment in segments:
@@ -101,15 +101,9 @@ def setup_xml(
 ) -> str:
     """Set-up of InverseDynamicsTool; files : ``model_file``, ``coordinates_file`` and
     ``external_loads_file``, next to it. The motion is smooth: no further filter."""
-    document = _document(said)
+    document = xml_document("OpenSimDocument", said, Version="40000")
     tool = ET.SubElement(document, "InverseDynamicsTool", name=name)
     texts = {"results_directory": ".", **files, "time_range": f"{from_s:.12g} {to_s:.12g}"}
     texts |= {"forces_to_exclude": "Muscles", "lowpass_cutoff_frequency_for_coordinates": "-1"}
     add_texts(tool, texts | {"output_gen_force_file": f"{name}.sto"})
     return xml_text(document)
-
-
-def _document(said: Sequence[str]) -> ET.Element:
-    document = ET.Element("OpenSimDocument", Version="40000")
-    document.append(ET.Comment(xml_comment(said)))
-    return document

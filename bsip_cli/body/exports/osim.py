@@ -18,10 +18,13 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.exports.identified import (
+    AXES,
+    BodyOnJoint,
     IdentifiedPerson,
     neutral_pose,
     numbers,
     xml_comment,
+    xml_document,
     xml_text,
 )
 from bsip_cli.body.gravity import GRAVITY_M_S2
@@ -42,24 +45,23 @@ COORDINATES = {
 """Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
 (flexion), X after that turn, and Y of the segment."""
 _KINDS = ("Body", "Joint", "Marker")
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def osim_text(body: IdentifiedPerson) -> str:
     """An OpenSim 4 model: bodies, custom and pin joints, markers. Errors as of `check_bodies` and
     `markers`."""
     body.check_bodies()
-    document = ET.Element("OpenSimDocument", Version="40000")
-    document.append(ET.Comment(xml_comment(body.said("osim"))))
+    document = xml_document("OpenSimDocument", body.said("osim"), Version="40000")
     model = ET.SubElement(document, "Model", name=body.name)
     ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
     sets = (ET.SubElement(model, f"{kind}Set", name=f"{kind}set".lower()) for kind in _KINDS)
     bodies, joints, markers = (ET.SubElement(one, "objects") for one in sets)
-    for i, name in enumerate(body.person.skeleton.segments):
-        set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
-        _add_joint(joints, body, i)
+    height = numbers([body.height_of_base_m()])
+    for one in body.tree():
+        set_inertia(ET.SubElement(bodies, "Body", name=one.segment), one.inertia)
+        _add_joint(joints, one, height)
     for name, segment, place in body.markers():
-        on = f"/bodyset/{body.person.skeleton.segments[segment]}"
+        on = f"/bodyset/{segment}"
         parts = {"socket_parent_frame": on, "location": numbers(place), "fixed": "true"}
         add_texts(ET.SubElement(markers, "Marker", name=name), parts)
     return xml_text(document)
@@ -81,30 +83,26 @@ def add_texts(element: ET.Element, texts: Mapping[str, str]) -> None:
         ET.SubElement(element, tag).text = text
 
 
-def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
-    person = body.person
-    skeleton = person.skeleton
-    kind, name = skeleton.joint_types[i], skeleton.joints[i]
-    parent = f"/bodyset/{skeleton.segments[skeleton.parents[i]]}" if i else "/ground"
-    joint = ET.SubElement(joints, _JOINTS[kind], name=name)
+def _add_joint(joints: ET.Element, one: BodyOnJoint, height: str) -> None:
+    """``height`` is where the base stands at first [m]."""
+    joint = ET.SubElement(joints, _JOINTS[one.kind], name=one.joint)
     add_texts(joint, {"socket_parent_frame": "in_parent", "socket_child_frame": "in_child"})
     coordinates = ET.SubElement(joint, "coordinates")
-    for part in COORDINATES[kind]:
-        coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{name}_{part}")
+    for part in COORDINATES[one.kind]:
+        coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{one.joint}_{part}")
         if part == "ty":
-            height = numbers([body.height_of_base_m()])
             ET.SubElement(coordinate, "default_value").text = height
     frames = ET.SubElement(joint, "frames")
-    position = person.joint_positions_m()[i]
+    parent = f"/bodyset/{one.parent}" if one.parent else "/ground"
     for frame, socket, tilt, place in (
-        ("in_parent", parent, person.parent_tilt_rad[i], position),
-        ("in_child", f"/bodyset/{skeleton.segments[i]}", person.child_tilt_rad[i], np.zeros(3)),
+        ("in_parent", parent, one.parent_tilt_rad, one.place_m),
+        ("in_child", f"/bodyset/{one.segment}", one.child_tilt_rad, np.zeros(3)),
     ):
         offset = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
         turned = {"translation": numbers(place), "orientation": numbers([tilt, 0.0, 0.0])}
         add_texts(offset, {"socket_parent": socket} | turned)
-    if kind != "revolute":
-        _add_transform(joint, name, kind)
+    if one.kind != "revolute":
+        _add_transform(joint, one.joint, one.kind)
 
 
 def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
@@ -117,7 +115,7 @@ def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
         is_free = part in COORDINATES[kind]
         if is_free:
             ET.SubElement(one, "coordinates").text = f"{name}_{part}"
-        ET.SubElement(one, "axis").text = numbers(_AXES[part[1]])
+        ET.SubElement(one, "axis").text = numbers(AXES[part[1]])
         function = ET.SubElement(one, "LinearFunction" if is_free else "Constant", name="function")
         tag, value = ("coefficients", [1.0, 0.0]) if is_free else ("value", [0.0])
         ET.SubElement(function, tag).text = numbers(value)

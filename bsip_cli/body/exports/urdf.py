@@ -8,15 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 
 from bsip_cli.body.exports.identified import (
+    AXES,
     BALL_AXES,
+    BodyOnJoint,
     IdentifiedPerson,
     numbers,
-    xml_comment,
+    xml_document,
     xml_text,
 )
 from bsip_cli.body.inertia import Inertia
 
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # Turns the segments' axes (X anterior, Y up, Z right) upright in a world with Z up.
 _UPRIGHT = (np.pi / 2, 0.0, 0.0)
 
@@ -24,12 +25,11 @@ _UPRIGHT = (np.pi / 2, 0.0, 0.0)
 def urdf_text(body: IdentifiedPerson) -> str:
     """A URDF robot; the reader adds the free base. Errors as of `check_bodies`."""
     body.check_bodies()
-    robot = ET.Element("robot", name=body.name)
-    robot.append(ET.Comment(xml_comment(body.said("urdf"))))
+    robot = xml_document("robot", body.said("urdf"), name=body.name)
     _add_link(robot, "base")
-    for i, segment in enumerate(body.person.skeleton.segments):
-        _add_joints(robot, body, i)
-        _add_link(robot, segment, body.in_joint(i))
+    for one in body.tree():
+        _add_joints(robot, one)
+        _add_link(robot, one.segment, one.inertia)
     return xml_text(robot)
 
 
@@ -47,28 +47,23 @@ def _add_link(robot: ET.Element, name: str, inertia: Inertia | None = None) -> N
     ET.SubElement(inertial, "inertia", moments)
 
 
-def _add_joints(robot: ET.Element, body: IdentifiedPerson, i: int) -> None:
+def _add_joints(robot: ET.Element, one: BodyOnJoint) -> None:
     """The joint, or the chain of joints, between a segment and its parent."""
-    person = body.person
-    skeleton = person.skeleton
-    name, segment = skeleton.joints[i], skeleton.segments[i]
-    parent = skeleton.segments[skeleton.parents[i]]
-    position = person.joint_positions_m()[i]
-    tilt = (person.parent_tilt_rad[i] - person.child_tilt_rad[i], 0.0, 0.0)
-    if skeleton.joint_types[i] == "free":
+    name, parent, segment = one.joint, one.parent, one.segment
+    if one.kind == "free":
         _add_joint(robot, name, "fixed", "base", segment, rpy=_UPRIGHT)
-    elif skeleton.joint_types[i] == "revolute":
-        axis = person.hinge_axes()[i]
-        _add_joint(robot, name, "continuous", parent, segment, xyz=position, rpy=tilt, axis=axis)
+    elif one.kind == "revolute":
+        rpy, place = (one.parent_tilt_rad - one.child_tilt_rad, 0.0, 0.0), one.place_m
+        _add_joint(robot, name, "continuous", parent, segment, xyz=place, rpy=rpy, axis=one.axis)
     else:
         between = [f"{name}_{BALL_AXES[: k + 1]}" for k in range(2)]
         for link in between:
             _add_link(robot, link)
-        ends = [parent, *between, segment]
-        for k, letter in enumerate(BALL_AXES):
-            place, axis = position if k == 0 else np.zeros(3), _AXES[letter]
-            one = f"{name}_{letter}"
-            _add_joint(robot, one, "continuous", ends[k], ends[k + 1], xyz=place, axis=axis)
+        ends, xyz = [parent, *between, segment], one.place_m
+        for letter, above, below in zip(BALL_AXES, ends, ends[1:], strict=False):
+            joint = f"{name}_{letter}"
+            _add_joint(robot, joint, "continuous", above, below, xyz=xyz, axis=AXES[letter])
+            xyz = np.zeros(3)
 
 
 def _add_joint(

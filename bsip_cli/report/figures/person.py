@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import tree_of
+from bsip_cli.motion.inverse_kinematics import posed
 from bsip_cli.report.figures import canvas
 from bsip_cli.report.records import clock_of, flags_of, measured_of
 
@@ -130,7 +130,8 @@ def poses_of(
         return ()
     rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
     q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
-    R, p = tree_of(body).forward(q)
+    at = posed(body, q)
+    R, p = at.R, at.p
     x, y = anterior / np.linalg.norm(anterior)
     axes = np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])  # forward, to the right, up
     bones = _bones(body)

@@ -11,6 +11,7 @@ import numpy as np
 
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.off_the_body import without_foreign_places
 from bsip_cli.recordings.units import length_in_m, length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
@@ -55,6 +56,8 @@ _SIDED_PARTS = {
         ("calcaneus",),
         ("calcaneus", "metatarsal_1", "metatarsal_2", "metatarsal_5"),
     ),
+    "legs": (("asis",), ("psis", "sacrum"), ("knee_lateral", "knee_medial")),
+    "arms": (("suprasternale", "xiphoid"), ("c7", "t10"), ("elbow_lateral", "elbow_medial")),
 }
 
 # Ends of segments: the distance between them changes less than that to the other side's other end.
@@ -109,14 +112,14 @@ def decided_unit(
 
 
 def without_absurd(positions_m: np.ndarray) -> list[Finding]:
-    """Turn positions beyond any laboratory into missing ones (in place), and say so."""
+    """Turn positions (n_frames, n_markers, 3) beyond any laboratory, and those where no marker on
+    the body can be, into missing ones (in place), and say so."""
     absurd = ((positions_m > LARGEST_LAB_M) | (positions_m < -LARGEST_LAB_M)).any(axis=-1)
-    if not absurd.any():
-        return []
     positions_m[absurd] = np.nan
     found = f"{int(absurd.sum())} positions more than {LARGEST_LAB_M:g} m away"
     expected, action = "markers in a laboratory", "took them as missing"
-    return [Finding("points", "", found, expected, action, "warning")]
+    about = Finding("points", "", found, expected, action, "warning")
+    return [*([about] if absurd.any() else []), *without_foreign_places(positions_m)]
 
 
 def move_like_markers(positions_m: np.ndarray, rate_hz: float) -> bool:

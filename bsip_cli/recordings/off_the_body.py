@@ -23,6 +23,7 @@ _MATES = 8
 _USUALLY = 0.2, 0.5, 0.8  # of the poses: who is off the body more often has no mates
 _MOVES = 0.8  # of the markers move less than the one by which poses are chosen: two limbs may rest
 _POSES, _FRAMES = 100, 1000
+_AT_REST_M = 1e-6  # of a way, so that where nothing moves poses are even in time
 _MOST_MARKERS = 400  # more are not a person's
 _PLATEAU = 0.9  # of the furthest
 
@@ -81,7 +82,7 @@ def _poses(positions_m: np.ndarray) -> np.ndarray:
     step = max(1, len(positions_m) // _FRAMES)
     ways = np.linalg.norm(np.diff(positions_m[::step], axis=0), axis=-1)
     way = np.sort(np.nan_to_num(ways), axis=1)[:, int(_MOVES * ways.shape[1])]
-    gone = np.concatenate([[0.0], np.cumsum(way)])
+    gone = np.concatenate([[0.0], np.cumsum(way + _AT_REST_M)])
     return step * np.searchsorted(gone, np.linspace(0.0, gone[-1], _POSES))
 
 
@@ -122,14 +123,14 @@ class _Mates:
         far, near = change > _PAIR_M, change <= _PAIR_M
         left = ~(near & ~off[:, self.columns]).any(axis=1) & (far.sum(axis=1) > 1)
         for n in np.flatnonzero(left).tolist():
-            others = self.columns[far[n]]
-            left[n] = any(
-                (body[one].change_m(positions_m[[n]])[0] <= _PAIR_M)[
-                    np.isin(body[one].columns, others)
-                ].any()
-                for one in others.tolist()
-            )
+            others = self.columns[far[n]].tolist()
+            left[n] = any(body[one].holds_to(others, positions_m[n]) for one in others)
         return left
+
+    def holds_to(self, others: Sequence[int], places_m: np.ndarray) -> bool:
+        """Whether it is as far as usual from one of them, in ``places_m`` (n_markers, 3)."""
+        change = self.change_m(places_m[None])[0][np.isin(self.columns, others)]
+        return bool((change <= _PAIR_M).any())
 
 
 def _exchanged(off: np.ndarray, positions_m: np.ndarray, body: Sequence[_Mates]) -> np.ndarray:

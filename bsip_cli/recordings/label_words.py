@@ -137,7 +137,9 @@ def bones(labels: Sequence[str]) -> int:
 
 def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     labels = list(dict.fromkeys(labels))
-    drawn = _drawn_frames(labels)
+    stems = {label[:-1] for label in labels if label.endswith(_AXES[0])}
+    frames = ({stem + axis for axis in _AXES} for stem in stems)  # that a program drew
+    drawn = set().union(*(frame for frame in frames if frame <= {*labels}))
     real = [label for label in labels if label not in drawn and len(label) <= _LONGEST]
     read = {lang: _read_all(real, lang) for lang in _languages() if lang.may_be(real)}
     best = read[max(read, key=lambda lang: _worth(read[lang]) * lang.part)]
@@ -206,14 +208,6 @@ def _stem(label: str) -> str:
     return re.sub(r"[\s._-]*\d+$", "", label)
 
 
-def _drawn_frames(labels: Sequence[str]) -> set[str]:
-    """Points of frames that a program drew: a stem with 0, 1, 2 and 3 behind it."""
-    present = set(labels)
-    stems = {label[:-1] for label in labels if label.endswith("0")}
-    drawn = {stem for stem in stems if all(stem + axis in present for axis in _AXES)}
-    return {stem + axis for stem in drawn for axis in _AXES}
-
-
 # --- one label -----------------------------------------------------------------------------------
 
 
@@ -222,7 +216,7 @@ def _ways(
     label: str, language: _Language
 ) -> tuple[tuple[Meaning | None, float, frozenset[str]], ...]:
     """What a label may mean: meaning, cost, and how the same on the other side would be spelt."""
-    grammar, spelling = _grammar(), _spelling(label)
+    grammar, spelling = _grammar(), _Spelling(label)
     ways = []
     for reading in _cuts(spelling, 0, language, _MOST_WORDS):
         if reading.side and len(spelling.text) < _SHORTEST:
@@ -249,46 +243,41 @@ def _pieces(label: str) -> list[str]:
     return [part.casefold() for part in parts]
 
 
-@dataclass(frozen=True)
 class _Spelling:
     """A joined label; places where a part ends or begins, and those of them with a separator."""
 
-    text: str
-    seams: frozenset[int]
-    separators: frozenset[int]
-
-
-def _spelling(label: str) -> _Spelling:
-    parts = [_pieces(part) for part in re.split(r"[\s._-]+", label)]
-    lengths = [[len(piece) for piece in part] for part in parts]
-    return _Spelling(
-        "".join(map("".join, parts)),
-        frozenset({0, *accumulate(chain.from_iterable(lengths))}),
-        frozenset({0, *accumulate(map(sum, lengths))}),
-    )
+    def __init__(self, label: str) -> None:
+        parts = [_pieces(part) for part in re.split(r"[\s._-]+", label)]
+        self.text = "".join(chain.from_iterable(parts))
+        self.seams = {0, *accumulate(map(len, chain.from_iterable(parts)))}
+        self.separators = {0, *accumulate(len("".join(part)) for part in parts)}
 
 
 def _cuts(
-    spelling: _Spelling, start: int, language: _Language, words_left: int, before: str = ""
+    spelling: _Spelling,
+    start: int,
+    language: _Language,
+    words_left: int,
+    letters: int = 0,
+    has_long: bool = False,
 ) -> Iterator[_Reading]:
-    """All ways; ``before`` is what the words before have of the same part, a dot for each letter
-    that stands for itself and a dash for longer ones."""
+    """All ways; of the same part, before ``start``: how many letters stand for themselves, and
+    whether there is a longer word that is no side."""
     if start == len(spelling.text):
         yield _Reading((), "", 0.0)
         return
     if not words_left:
         return
-    before = "" if start in spelling.seams else before
+    if start in spelling.seams:
+        letters, has_long = 0, False
     nouns = _grammar().segments.keys()
     for end, concepts, side, cost in _words_at(spelling, start, language):
         is_letter = end - start == 1
-        so_far = before + ("." if is_letter else "" if side else "-")
+        n_letters, is_long = letters + is_letter, has_long or not (is_letter or side)
         # Else words of other languages are understood by letters, or by one that is left over.
-        if so_far.count(".") + ("-" in so_far) > _LETTERS or (
-            is_letter and "-" in before and nouns & {*concepts}
-        ):
+        if n_letters + is_long > _LETTERS or (is_letter and has_long and nouns & {*concepts}):
             continue
-        for rest in _cuts(spelling, end, language, words_left - 1, so_far):
+        for rest in _cuts(spelling, end, language, words_left - 1, n_letters, is_long):
             if not (side and rest.side):
                 yield _Reading(
                     (*concepts, *rest.concepts),

@@ -208,16 +208,15 @@ def told_from(labels: Sequence[str], prefix: str = "") -> Guess:
     rest = [name for k, name in enumerate(names) if k not in set(columns.values())]
     more = []
     spelt = {names[columns[m.label]]: m.segment for m in shipped}
-    siblings = {
-        name: next((s for o, s in spelt.items() if are_numbered(name, o)), "") for name in rest
-    }
     for name in rest:
-        if name in understood and name not in known:
-            meant = understood[name]
-            if siblings[name] not in ("", meant.segment):  # numbered ones sit on one segment
-                meant = Meaning(siblings[name], "")
-            landmark = "" if meant.landmark in taken else meant.landmark
-            more.append(Marker(name, meant.segment, landmark, meant.weight, False, ()))
+        if name not in understood or name in known:
+            continue
+        meant = understood[name]
+        sibling = next((s for o, s in spelt.items() if are_numbered(name, o)), meant.segment)
+        if sibling != meant.segment:  # numbered ones sit on one segment
+            meant = Meaning(sibling, "")
+        landmark = "" if meant.landmark in taken else meant.landmark
+        more.append(Marker(name, meant.segment, landmark, meant.weight, False, ()))
     if base and not more:  # the words add nothing
         return Guess(base.marker_set, base)
     unknown = tuple(name for name in rest if name not in understood)
@@ -237,29 +236,28 @@ def with_pairs_named(
     right of the trunk are, and they are as far apart as such a joint is broad. ``markers_m``
     (n_frames, n_markers, 3), NaN = missing."""
     meant = _meant(labels, markers_m, marker_set, prefix)
+    to_right = _to_right(markers_m, meant)
     named, outer_ones, inner_ones = list(labels), {}, []
     for name, count in Counter(name for name, _ in meant.values()).items():
         two = [column for column, (one, _) in meant.items() if one == name]
-        may_be = meant[two[0]][1]
-        lateral = next((m for m in may_be if medial_of(m.landmark)), None)
+        may_be = {m.landmark: m for m in meant[two[0]][1]}
+        lateral = next((one for one in may_be if medial_of(one) in may_be), None)
         if lateral is None or len(may_be) != 2 or count != 2:
             continue
-        inner = medial_of(lateral.landmark)
-        medial = next((m for m in may_be if m.landmark == inner), None)
-        pair = _Pair.of(markers_m, two, meant, lateral.landmark)
-        if medial is None or pair.outer is None or not pair.is_joint:
+        pair = _Pair.of(markers_m, two, to_right, lateral)
+        if pair.outer is None or not pair.is_joint:
             continue
-        inside = two[1 - two.index(pair.outer)]
-        named[pair.outer] = labels[pair.outer].replace(name, lateral.label)
-        named[inside] = labels[inside].replace(name, medial.label)
-        outer_ones[name] = lateral.label
-        inner_ones.append(medial.label)
+        inner = two[1 - two.index(pair.outer)]
+        outer_ones[name] = may_be[lateral].label
+        inner_ones.append(may_be[medial_of(lateral)].label)
+        named[pair.outer] = labels[pair.outer].replace(name, outer_ones[name])
+        named[inner] = labels[inner].replace(name, inner_ones[-1])
     if not outer_ones:
         return tuple(labels), []
-    found, expected = "a label that two columns share", "one column per marker"
-    action = _sides_of(outer_ones.values(), inner_ones)
-    subject = ", ".join(outer_ones)
-    return tuple(named), [Finding("labels", subject, found, expected, action, "corrected")]
+    found, action = "a label that two columns share", _sides_of(outer_ones.values(), inner_ones)
+    one_each = "one column per marker"
+    about = Finding("labels", ", ".join(outer_ones), found, one_each, action, "corrected")
+    return tuple(named), [about]
 
 
 def with_numbers_placed(
@@ -268,43 +266,44 @@ def with_numbers_placed(
     """A set in which the lateral and the medial marker of a joint that differ by a number only are
     told by their places, as `with_pairs_named` has it."""
     meant = _meant(labels, markers_m, marker_set, prefix)
+    to_right = _to_right(markers_m, meant)
     columns = {m.label: column for column, (_, of) in meant.items() for m in of[:1]}
     known = (m for m in marker_set.markers if m.landmark and m.label in columns)
-    by_landmark = {m.landmark: m for m in known}
-    landmarks: dict[str, str | None] = {}
+    by_landmark = {m.landmark: m.label for m in known}
+    now: dict[str, str | None] = {}  # landmarks by label; None: no marker of the joint
     said: dict[tuple[str, str], list[str]] = {}
+    outer_ones, inner_ones = [], []
     for landmark, lateral in by_landmark.items():
-        medial = by_landmark.get(medial_of(landmark))
-        if medial is None or not are_numbered(lateral.label, medial.label):
+        medial = by_landmark.get(inner := medial_of(landmark))
+        if medial is None or not are_numbered(lateral, medial):
             continue
-        pair = _Pair.of(markers_m, [columns[lateral.label], columns[medial.label]], meant, landmark)
-        two = lateral.label, medial.label
+        pair = _Pair.of(markers_m, [columns[lateral], columns[medial]], to_right, landmark)
         if not pair.is_joint:
-            landmarks |= dict.fromkeys(two)
+            now |= {lateral: None, medial: None}
             found = f"two numbers, no pair of a joint: {1e3 * pair.apart_m:.0f} mm apart"
-            said.setdefault((found, "left them out"), []).extend(two)
+            said.setdefault((found, "left them out"), []).extend((lateral, medial))
         elif pair.outer is None:
-            landmarks |= dict.fromkeys(two, "")
+            now |= {lateral: "", medial: ""}
             found = "two numbers, of which none is the outer one in most frames"
-            said.setdefault((found, "took them to track only"), []).extend(two)
-        elif pair.outer == columns[medial.label]:
-            landmarks |= {two[0]: medial.landmark, two[1]: landmark}
-    kept = tuple(
-        replace(m, landmark=now)
-        for m in marker_set.markers
-        if (now := landmarks.get(m.label, m.landmark)) is not None
-    )
+            said.setdefault((found, "took them to track only"), []).extend((lateral, medial))
+        elif pair.outer == columns[medial]:
+            now |= {lateral: inner, medial: landmark}
+            outer_ones.append(medial)
+            inner_ones.append(lateral)
     expected = "the lateral and the medial marker of a joint"
     findings = [
         Finding("labels", ", ".join(names), found, expected, action, "warning")
         for (found, action), names in said.items()
     ]
-    outer_ones = [label for label, now in landmarks.items() if now and medial_of(now)]
     if outer_ones:
-        inner_ones = [label for label, now in landmarks.items() if now and not medial_of(now)]
         action, found = _sides_of(outer_ones, inner_ones), "the lower number is the inner one"
         subject = ", ".join(inner_ones)
         findings.append(Finding("labels", subject, found, expected, action, "corrected"))
+    kept = tuple(
+        replace(m, landmark=place)
+        for m in marker_set.markers
+        if (place := now.get(m.label, m.landmark)) is not None
+    )
     return replace(marker_set, markers=kept), findings
 
 
@@ -334,12 +333,8 @@ class _Pair:
     outer: int | None
 
     @staticmethod
-    def of(
-        markers_m: np.ndarray,
-        two: Sequence[int],
-        meant: Mapping[int, tuple[str, Sequence[Marker]]],
-        landmark: str,
-    ) -> _Pair:
+    def of(markers_m: np.ndarray, two: Sequence[int], to_right: np.ndarray, landmark: str) -> _Pair:
+        """``to_right`` : of the trunk, (n_frames, 3)."""
         apart = markers_m[:, two[0]] - markers_m[:, two[1]]
         far_m = np.linalg.norm(apart, axis=1)
         far_m = far_m[np.isfinite(far_m)]
@@ -347,16 +342,17 @@ class _Pair:
             return _Pair(False, float("nan"), None)
         low, high = (times * breadth_m(landmark, stature_m) for times, stature_m in _BROAD)
         is_joint = bool(np.mean((far_m > low) & (far_m < high)) > 0.5)
-        to_right = _to_right(markers_m, {column: of for column, (_, of) in meant.items()})
         ahead = (apart * to_right).sum(axis=1) * (1 if landmark.endswith("_r") else -1)
         first = float(np.mean(ahead[np.isfinite(ahead)] > 0)) if np.isfinite(ahead).any() else 0.5
         outer = two[0] if first >= _OUTER else two[1] if first <= 1 - _OUTER else None
         return _Pair(is_joint, float(np.median(far_m)), outer)
 
 
-def _to_right(markers_m: np.ndarray, meant: Mapping[int, Sequence[Marker]]) -> np.ndarray:
+def _to_right(
+    markers_m: np.ndarray, meant: Mapping[int, tuple[str, Sequence[Marker]]]
+) -> np.ndarray:
     """From left to right of the trunk, (n_frames, 3); NaN where that is not seen."""
-    sure = {column: markers[0] for column, markers in meant.items() if len(markers) == 1}
+    sure = {column: of[0] for column, (_, of) in meant.items() if len(of) == 1}
     trunk = {column: marker.landmark for column, marker in sure.items() if marker.segment in TRUNK}
     right, left = ([c for c, name in trunk.items() if name.endswith(side)] for side in ("_r", "_l"))
     if not right or not left:

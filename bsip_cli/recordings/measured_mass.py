@@ -53,7 +53,6 @@ class MeasuredMass:
     mass_kg: float
     sd: float
     seconds: float
-    intervals: int
     reason: str = ""
     remark: str = ""
     of_nobody: bool = False
@@ -76,7 +75,7 @@ class MeasuredMass:
 
 
 def unknown(reason: str) -> MeasuredMass:
-    return MeasuredMass(float("nan"), float("nan"), 0.0, 0, reason)
+    return MeasuredMass(float("nan"), float("nan"), 0.0, reason)
 
 
 def steady(intervals: Sequence[Interval]) -> tuple[Interval, ...]:
@@ -190,8 +189,7 @@ def _judged(
 ) -> MeasuredMass:
     whole = _combined(kept)
     seconds = sum(one.seconds for trial in kept for one in trial)
-    count = sum(len(trial) for trial in kept)
-    measured = MeasuredMass(whole.mass, float(np.hypot(whole.sd, GAIN_SD)), seconds, count)
+    measured = MeasuredMass(whole.mass, float(np.hypot(whole.sd, GAIN_SD)), seconds)
     if not measured.half_width_percent <= most_percent:
         return unknown(
             f"the plates measure {measured.mass_kg:.1f} kg to {measured.half_width_percent:.0f} % "
@@ -218,9 +216,7 @@ def differing_plates(
     plates : intervals by the plate that bears all. apart_percent : what may differ beside the
     intervals.
     """
-    measured = {name: measured_mass({name: some}, _PERCENT) for name, some in plates.items()}
-    measured = {name: one for name, one in measured.items() if one.is_known}
-    findings = []
+    measured, findings = _known(plates), []
     for name, one in measured.items():
         others = {k: two for k, two in measured.items() if _are_apart(one, two, apart_percent)}
         known = person_kg is not None and not _are_apart(
@@ -245,8 +241,7 @@ def differing_trials(trials: Mapping[str, Sequence[Interval]], apart_percent: fl
 
     apart_percent : what may differ beside the intervals.
     """
-    every = {name: measured_mass({name: some}, _PERCENT) for name, some in trials.items()}
-    shown = {name: one for name, one in every.items() if one.is_known}
+    shown = _known(trials)
     if len(shown) < 2:
         return ""
     usual, odd = odd_ones(
@@ -280,7 +275,7 @@ def plate_gains(
     every = {name: measured_mass(some, most_percent) for name, some in plates.items()}
     shown = [one for one in every.values() if one.is_known]
     if stated_kg is not None:
-        shown.append(MeasuredMass(stated_kg, alike_percent / _PERCENT / HALF_WIDTH, 0.0, 0))
+        shown.append(MeasuredMass(stated_kg, alike_percent / _PERCENT / HALF_WIDTH, 0.0))
     gains = {}
     for name, one in every.items():
         others = [two for two in shown if two is not one]
@@ -295,6 +290,12 @@ def plate_gains(
             )
             gains[name] = float(one.mass_kg / usual)
     return gains
+
+
+def _known(intervals: Mapping[str, Sequence[Interval]]) -> dict[str, MeasuredMass]:
+    """What each plate or trial shows, however vaguely."""
+    every = {name: measured_mass({name: some}, _PERCENT) for name, some in intervals.items()}
+    return {name: one for name, one in every.items() if one.is_known}
 
 
 def _are_apart(one: MeasuredMass, other: MeasuredMass, percent: float) -> bool:

@@ -274,13 +274,12 @@ def upright_frames(markers_m: Mapping[str, np.ndarray]) -> np.ndarray:
 
     Without markers on both, nothing is known to be upright.
     """
-    middles = {}
-    for name in ("lower_torso", "shank_l", "shank_r"):
-        seen = markers_m.get(name, np.empty((0, 0, 3)))
-        axes = [mean_path(seen[..., axis]) for axis in range(3)]
-        known = [axis for axis in axes if axis is not None]
-        if len(known) < 3:
-            return np.zeros(len(next(iter(markers_m.values()))), bool)
-        middles[name] = np.stack(known, axis=1)
-    up = middles["lower_torso"] - np.mean([middles["shank_l"], middles["shank_r"]], axis=0)
-    return np.asarray(up[:, 2] > UPRIGHT_COS * np.maximum(np.linalg.norm(up, axis=1), 1e-6))
+    nothing = np.empty((0, 0, 3))
+    seen = [markers_m.get(name, nothing) for name in ("lower_torso", "shank_l", "shank_r")]
+    paths = [mean_path(each[..., axis]) for each in seen for axis in range(3)]
+    known = [path for path in paths if path is not None]
+    if len(known) < len(paths):
+        return np.zeros(len(next(iter(markers_m.values()))), bool)
+    pelvis, *shanks = np.reshape(known, (3, 3, -1))
+    up = pelvis - np.mean(shanks, axis=0)
+    return np.asarray(up[2] > UPRIGHT_COS * np.maximum(np.linalg.norm(up, axis=0), 1e-6))

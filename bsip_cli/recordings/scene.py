@@ -11,6 +11,7 @@ import numpy as np
 
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.off_the_body import without_foreign_places
 from bsip_cli.recordings.units import length_in_m, length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
@@ -55,6 +56,8 @@ _SIDED_PARTS = {
         ("calcaneus",),
         ("calcaneus", "metatarsal_1", "metatarsal_2", "metatarsal_5"),
     ),
+    "legs": (("asis",), ("psis", "sacrum"), ("knee_lateral",)),
+    "arms": (("suprasternale", "xiphoid"), ("c7", "t10"), ("elbow_lateral",)),
 }
 
 # Ends of segments: the distance between them changes less than that to the other side's other end.
@@ -109,14 +112,14 @@ def decided_unit(
 
 
 def without_absurd(positions_m: np.ndarray) -> list[Finding]:
-    """Turn positions beyond any laboratory into missing ones (in place), and say so."""
+    """Turn positions (n_frames, n_markers, 3) beyond any laboratory, and those where no marker on
+    the body can be, into missing ones (in place), and say so."""
     absurd = ((positions_m > LARGEST_LAB_M) | (positions_m < -LARGEST_LAB_M)).any(axis=-1)
-    if not absurd.any():
-        return []
     positions_m[absurd] = np.nan
     found = f"{int(absurd.sum())} positions more than {LARGEST_LAB_M:g} m away"
     expected, action = "markers in a laboratory", "took them as missing"
-    return [Finding("points", "", found, expected, action, "warning")]
+    about = Finding("points", "", found, expected, action, "warning")
+    return [*([about] if absurd.any() else []), *without_foreign_places(positions_m)]
 
 
 def move_like_markers(positions_m: np.ndarray, rate_hz: float) -> bool:
@@ -220,18 +223,18 @@ def stature(labels: Sequence[str], markers_m: np.ndarray) -> Stature | None:
     feet = [by_part[name] for name in ("foot_l", "foot_r") if name in by_part]
     if part is None or not feet:
         return None
-    tall = []
+    tall = [np.zeros(0)]
     for foot in feet:
         foot = foot[:, np.isfinite(foot).all(axis=-1).any(axis=0)]
         if not foot.size:
             continue
         lift = foot[..., 2] - np.nanpercentile(foot[..., 2], 2, axis=0)
         frames = np.flatnonzero((lift < _FLAT_M).all(axis=1))
+        frames = frames[:: max(1, len(frames) // _FEW)]
         if len(frames):
-            frames = frames[:: max(1, len(frames) // _FEW)]
             ways = by_part[part][frames, :, None] - foot[frames, None]
             tall.append(np.linalg.norm(ways, axis=-1).reshape(len(frames), -1).max(axis=1))
-    found = np.concatenate(tall or [np.zeros(0)])
+    found = np.concatenate(tall)
     found = found[np.isfinite(found)]
     return Stature(float(np.percentile(found, 90)) / _PARTS[part], part) if len(found) else None
 
@@ -449,6 +452,10 @@ def crossed_limbs(labels: Sequence[str], markers_m: np.ndarray) -> list[str]:
     """Segments of markers (n_frames, n_markers, 3) whose ends keep their distance from those of the
     other side, and not from each other."""
     known, found = _landmarks(labels), []
+
+    def change_m(one: np.ndarray, other: np.ndarray) -> float:
+        return float(np.ptp(np.percentile(np.linalg.norm(one - other, axis=-1), [20, 80])))
+
     for limb, ends in _LIMBS.items():
         names = [f"{end}_{side}" for end in ends for side in "lr"]
         if not all(name in known for name in names):
@@ -458,16 +465,8 @@ def crossed_limbs(labels: Sequence[str], markers_m: np.ndarray) -> list[str]:
         if not len(places):
             continue
         upper_l, upper_r, lower_l, lower_r = places.swapaxes(0, 1)
-        own, other = (
-            max(
-                float(np.ptp(np.percentile(np.linalg.norm(a - b, axis=-1), [20, 80])))
-                for a, b in pairs
-            )
-            for pairs in (
-                ((upper_l, lower_l), (upper_r, lower_r)),
-                ((upper_l, lower_r), (upper_r, lower_l)),
-            )
-        )
+        own = max(change_m(upper_l, lower_l), change_m(upper_r, lower_r))
+        other = max(change_m(upper_l, lower_r), change_m(upper_r, lower_l))
         if own > max(_CHANGES_M, _TIMES * other):
             found.append(limb)
     return found

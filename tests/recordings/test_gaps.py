@@ -5,6 +5,7 @@ from __future__ import annotations
 import ezc3d
 import numpy as np
 import pytest
+from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.markersets import load_marker_set
@@ -12,7 +13,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.gaps import fill_gaps, held_markers, repeated_frames, without_repeats
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.scene import without_sentinels
+from bsip_cli.recordings.scene import without_absurd, without_sentinels
 from tests.recordings.recording_writers import standing_markers, write_c3d, write_trc
 
 N, K = 240, 12
@@ -95,6 +96,34 @@ def test_a_sign_among_model_outputs_in_a_c3d(tmp_path):
     np.testing.assert_array_equal(
         np.isnan(recording.markers_m[..., 0]).nonzero()[0], np.arange(60, 70)
     )
+
+
+@pytest.mark.parametrize("at", [0.0, -1.0, 5.0])
+@pytest.mark.parametrize("hz", [3.0, 6.0, 100.0])
+@pytest.mark.parametrize("away", [(3,), (3, 7)])
+def test_gaps_that_were_filled_and_filtered_are_gaps(at, hz, away):
+    markers = _walking()
+    written = markers.copy()
+    written[100:115, away] = at
+    if hz < 50:
+        written[:, away] = filtfilt(*butter(2, hz / 50), written[:, away], axis=0)
+    wrong_m = np.linalg.norm(written - markers, axis=-1)
+    (finding,) = without_absurd(written)
+    lost = np.isnan(written).all(axis=-1)
+    assert np.isnan(written).sum() == 3 * lost.sum() and wrong_m[~lost].max() < 0.1
+    assert lost[100:115, away].all() and not lost[:70].any() and not lost[145:].any()
+    assert f"{lost.sum()} positions of {len(away)} markers" in finding.found
+
+
+def test_who_only_bears_another_ones_label_or_rises_after_long_rest_is_on_the_body():
+    markers = _walking()
+    markers[100:115, [3, 7]] = markers[100:115, [7, 3]]
+    assert without_absurd(markers) == []
+    still = np.repeat(_walking()[:1], 1200, axis=0)
+    still += np.random.default_rng(1).normal(0, 2e-4, still.shape)
+    legs = still[1150:, 6:]
+    legs += np.linspace(0, 0.4, 50)[:, None, None] * [0, 0, 1]
+    assert without_absurd(still) == []
 
 
 def _held(markers, marker, start, stop):

@@ -9,7 +9,7 @@ from bsip_cli.recordings.c3d import open_c3d
 from bsip_cli.recordings.c3d_person import against_table, stated_person, together
 from bsip_cli.recordings.model import StatedPerson
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.scene import Stature, crossed_limbs, stature
+from bsip_cli.recordings.scene import Stature, crossed_limbs, handedness, stature
 
 
 def stated(**groups: dict) -> tuple[StatedPerson, list[str]]:
@@ -177,3 +177,33 @@ def test_ankles_exchanged_in_walking_move_with_the_other_knee():
     assert crossed_limbs(labels, markers[:, [1, 0, 3, 2]]) == []
     markers[:, 3] = np.nan
     assert crossed_limbs(labels, markers) == []
+
+
+def test_whole_limbs_on_the_other_side_of_a_trunk_that_walks():
+    """Not told by distances between their own markers, nor by feet one before the other."""
+    x, side = np.sin(np.arange(100) / 8.0)[:, None, None], np.array([1.0, -1.0])
+    parts = {  # ahead, to the left, swing
+        "ASI": (0.1, 0.12, 0.0),
+        "PSI": (-0.1, 0.05, 0.0),
+        "KNE": (0.0, 0.1, 0.1),
+        "ANK": (0.0, 0.1, 0.3),
+        "HEE": (-0.1, 0.1, 0.35),
+        "TOE": (0.15, 0.1, 0.35),
+        "ELB": (0.0, 0.25, 0.05),
+    }
+    labels = [s + name for name in parts for s in "LR"] + ["C7", "CLAV"]
+    markers = np.zeros((100, len(labels), 3))
+    ahead, left, swing = np.repeat(np.array([*parts.values()]), 2, axis=0).T
+    markers[:, :-2, 0] = ahead + (x * swing[:, None] * np.tile(side, len(parts))[:, None])[..., 0]
+    markers[:, :-2, 1] = left * np.tile(side, len(parts))
+    markers[:, -2:, 0] = [-0.1, 0.1]
+
+    def exchanged(names):
+        swap = {s + one: o + one for one in names for s, o in ("LR", "RL")}
+        return handedness([swap.get(label, label) for label in labels], markers).exchanged()
+
+    assert exchanged([]) == []
+    assert exchanged(["KNE", "ANK", "HEE", "TOE"]) == ["legs"]
+    assert exchanged(["ELB"]) == ["arms"]
+    assert exchanged(["ASI", "PSI"]) == ["pelvis"]
+    assert handedness(labels, markers * [1, -1, 1]).sign == -1

@@ -88,11 +88,6 @@ def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> 
     return figure
 
 
-def _log_axes(figure: Figure, place: Sequence[float], x: tuple[float, float], rows: int) -> Axes:
-    left, top, width, height = place
-    return Axes(figure, left, top, width, height, x, (rows - 0.5, -0.5), is_log=True)
-
-
 def _log_ticks(low: float, high: float) -> dict[float, str]:
     return {float(t): f"{t:g}" for t in _TICKS if low <= t <= high}
 
@@ -109,7 +104,7 @@ def segment_masses(data: pd.DataFrame) -> Figure:
     known = np.concatenate([data["rm_kg"], om])
     ends = float(np.nanmin(known) / 1.35), float(np.nanmax(known) * 1.35)
     labels = {float(k): str(name) for k, name in enumerate(data.index)}
-    masses = _log_axes(figure, (left, top, 3 * part, height), ends, n)
+    masses = Axes(figure, left, top, 3 * part, height, ends, (n - 0.5, -0.5), is_log=True)
     masses.frame(_log_ticks(*ends), labels, "xy", x_title="mass [kg] (log scale)")
     keys = {}
     for method, kg, size in (
@@ -220,7 +215,7 @@ def gain_dots(components: Sequence[str], ratios: Mapping[str, np.ndarray]) -> Fi
     high = max(2.0, float(np.nanmax(everything))) * 1.15
     left = canvas.width_of(components) + _BESIDE
     place = left, top, WIDTH - left - _RIGHT, 8.0 * MM * rows
-    axes = _log_axes(figure, place, (low, high), rows)
+    axes = Axes(figure, *place, (low, high), (rows - 0.5, -0.5), is_log=True)
     labels = {float(k): name for k, name in enumerate(components)}
     title = "error over that of RM (left of 1: follows better)"
     axes.frame(_log_ticks(low, high), labels, "x", x_title=title)

@@ -6,7 +6,8 @@ import pytest
 from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.blocks import _tied
 from bsip_cli.report.errors import Gain, gains_of, one_number_alone, pooled_errors
-from bsip_cli.report.figures.canvas import middle_of_longest, plain, thinned
+from bsip_cli.report.figures.canvas import middle_of_longest, plain, thinned, ticks
+from bsip_cli.report.figures.charts import Panel, curves
 from bsip_cli.report.words import (
     component_label,
     count,
@@ -72,6 +73,27 @@ def test_runs_and_thinning():
     assert valid_intervals(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
     assert valid_intervals(np.zeros(3, dtype=bool)) == []
     assert len(np.arange(100_000)[thinned(100_000)]) <= 1200
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "labels"),
+    [
+        (0.1, 2.4, 5, ["0.5", "1.0", "1.5", "2.0"]),
+        (-160.0, 10.0, 5, ["−150", "−100", "−50", "0"]),
+        (-0.3, 0.6, 4, ["−0.25", "0.00", "0.25", "0.50"]),
+        (0.0, 100.0, 2, ["0", "50", "100"]),
+    ],
+)
+def test_ticks_are_round_and_say_what_they_are(low, high, most, labels):
+    found = ticks(low, high, most)
+    assert [*found.values()] == labels
+    assert [*found] == pytest.approx([float(x.replace("−", "-")) for x in labels])
+
+
+def test_a_curve_is_drawn_where_there_is_one_frame_or_none():
+    for signal in (np.array([2.0]), np.array([np.nan])):
+        page = curves([Panel("force <N>", np.array([1.0]), {"RM": signal})], 1).svg().decode()
+        assert "force &lt;N&gt;" in page and "nan" not in page
 
 
 def test_window_is_the_middle_of_the_longest_interval():

@@ -247,7 +247,7 @@ def span(*values: Any, margin: float = 0.05) -> tuple[float, float]:
     every = np.concatenate([np.ravel(one) for one in values])
     known = every[np.isfinite(every)]
     low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
-    more = margin * (high - low) or 0.5
+    more = margin * (high - low) if high > low else 0.5
     return float(low - more), float(high + more)
 
 

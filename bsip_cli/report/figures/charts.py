@@ -270,7 +270,7 @@ def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Fi
         row, column = divmod(k, columns)
         is_last = k + columns >= len(panels)
         place = 32.0 + column * width, top + row * pitch + 17.0, width - 36.0, pitch - 23.0
-        ends = float(panel.time_s[0]), float(panel.time_s[-1])
+        ends = canvas.span(panel.time_s, margin=0.0)
         bands = (s + sign * Z95 * panel.spreads[m] for m, s in panel.signals.items()
                  if m in panel.spreads for sign in (-1, 1))  # fmt: skip
         axes = Axes(figure, *place, ends, canvas.span(*panel.signals.values(), *bands))

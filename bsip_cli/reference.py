@@ -24,7 +24,7 @@ from bsip_cli.config import Config, Section, shipped
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
 from bsip_cli.pipeline import STAGES, Stage
-from bsip_cli.report.effect_words import EFFECT_WORDS, FOLLOWS, usual_words
+from bsip_cli.report.effect_words import EFFECT_WORDS, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"
@@ -136,12 +136,13 @@ def faults_page() -> str:
         "suite](../results.md#is-the-right-fault-named) hid most of them twice; named in 2 of 2 "
         "may still mean 34 %. Other answers: [how to read the report](../report.md)."
     ]
-    families: dict[str, list[str]] = {}
+    families: dict[tuple[str, str], list[str]] = {}
     for effect in CATALOGUE:
         words = EFFECT_WORDS[effect.name]
-        families.setdefault(words.family, []).append(f"- [{words.title}]({effect.name}.md)")
-    for family, lines in families.items():
-        parts += [f"## {family.capitalize()}", FOLLOWS[family].sentence, "\n".join(lines)]
+        own = families.setdefault((words.family, words.sentence), [])
+        own.append(f"- [{words.title}]({effect.name}.md)")
+    for (family, sentence), lines in families.items():
+        parts += [f"## {family.capitalize()}", sentence, "\n".join(lines)]
     return _page("The faults", parts)
 
 

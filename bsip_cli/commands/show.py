@@ -186,23 +186,21 @@ def _listed(head: str, sentences: Sequence[str]) -> str:
     return "\n".join([head, *(_wrapped(text, "  - ") for text in sentences)])
 
 
-def verdict_text(
-    name: str, found: Verdict, right: tuple[str, ...], columns: int | None = None
-) -> str:
-    """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
-    what was corrected before."""
-    lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, "", columns)]
-    lines += [_wrapped(one, f"{k:2d}. ", columns) for k, one in enumerate(found.causes, start=1)]
+def verdict_text(name: str, found: Verdict, right: tuple[str, ...]) -> str:
+    """A diagnosis for a terminal: causes numbered, lines broken; ``right`` says what was corrected
+    before."""
+    lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline)]
+    lines += [_wrapped(one, f"{k:2d}. ") for k, one in enumerate(found.causes, start=1)]
     rest = (*right, *found.results, *found.advice, found.limits)
-    lines += [_wrapped(text, "  - ", columns) for text in rest if text]
+    lines += [_wrapped(text, "  - ") for text in rest if text]
     return "\n".join(lines)
 
 
-def _wrapped(text: str, first: str = "", columns: int | None = None) -> str:
-    """In lines as wide as the terminal, or of so many columns."""
+def _wrapped(text: str, first: str = "") -> str:
+    """In lines as wide as the terminal."""
     return fill(
         printable(text),
-        max(40, min(columns or get_terminal_size().columns, _WIDEST)),
+        max(40, min(get_terminal_size().columns, _WIDEST)),
         initial_indent=first,
         subsequent_indent=" " * len(first),
         break_long_words=False,

@@ -7,7 +7,7 @@ import base64
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,7 +21,7 @@ from bsip_cli.report.cause_colours import Piece, fills
 from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from bsip_cli.report.figures.canvas import Figure
 
 Mark = Literal["", "better", "warning", "group"]
 Tone = Literal["plain", "good", "warning", "note"]
@@ -184,17 +184,9 @@ class Picture(Block):
     action: str = ""
     data: pd.DataFrame | None = None
 
-    def width_percent(self) -> float:
-        """Width on the page, so that letters are equally large in all figures."""
-        from bsip_cli.report.figures.canvas import WIDTH_MM
-
-        return min(100.0, 100.0 * self.figure.get_figwidth() * 25.4 / WIDTH_MM)
-
-    @cached_property
+    @property
     def svg(self) -> bytes:
-        from bsip_cli.report.figures.canvas import to_svg
-
-        return to_svg(self.figure)
+        return self.figure.svg()
 
 
 def picture(name: str, figure: Figure, data: pd.DataFrame, **words: str) -> Picture:

@@ -21,9 +21,12 @@ WEIGHT: tuple[str, str] = tuple(TEXTS["weight"])  # where quiet stance contradic
 
 
 @dataclass(frozen=True)
-class Consequence:
-    """What causes of a kind do to the results (``meaning``), and what to do (``action``)."""
+class EffectWords:
+    """``title``: the cause in general; of all causes of its ``family`` what they do to the results
+    (``meaning``), and what to do (``action``)."""
 
+    title: str
+    family: str
     meaning: str
     action: str
 
@@ -32,21 +35,9 @@ class Consequence:
         return f"{self.meaning} {self.action}"
 
 
-@dataclass(frozen=True)
-class EffectWords:
-    """``title``: the cause in general; ``family``: the key of what follows from it."""
-
-    title: str
-    family: str
-
-    @property
-    def follows(self) -> Consequence:
-        return FOLLOWS[self.family]
-
-
-FOLLOWS = {family: Consequence(**words) for family, words in _WORDS["follows"].items()}
 EFFECT_WORDS = {
-    name: EffectWords(about["title"], about["follows"]) for name, about in _WORDS["causes"].items()
+    name: EffectWords(about["title"], about["follows"], **_WORDS["follows"][about["follows"]])
+    for name, about in _WORDS["causes"].items()
 }
 MAIN_NUMBERS = {
     name: tuple(about["about"]) for name, about in _WORDS["causes"].items() if "about" in about

@@ -20,29 +20,16 @@ _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
 
 @dataclass(frozen=True)
-class Errors:
-    """Errors (RMSE) of the methods in one component: of OM, RM, and RM+mass if there."""
+class Gain:
+    """Errors (RMSE) of the methods in one component of one trial: of OM, RM, and RM+mass if there.
+    frames : that they rest on. held_out : OM had not seen the data."""
 
     component: str
     unit: str
     of: Mapping[str, float]
-
-    def change(self, method: str = OM) -> float:
-        """Relative change of RM's error: -0.4 is 40 % less."""
-        return relative_change(self.of[RM], self.of.get(method, np.nan))
-
-
-@dataclass(frozen=True)
-class Gain(Errors):
-    """Those of one trial. frames : that they rest on. held_out : OM had not seen the data."""
-
     trial: str
     frames: int
     held_out: bool
-
-
-def relative_change(before: float, after: float) -> float:
-    return after / before - 1.0 if before > 0.0 else float("nan")
 
 
 def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
@@ -63,27 +50,24 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
     return tuple(gains)
 
 
-def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
-    """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
-    no more than it is; trials without numbers are left out."""
-    known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
-    pooled = []
-    for name in COMPONENTS:
-        if mine := [gain for gain in known if gain.component == name]:
-            frames = [gain.frames for gain in mine]
-            methods = [m for m in METHODS if all(m in gain.of for gain in mine)]
-            squares = {m: [gain.of[m] ** 2 for gain in mine] for m in methods}
-            means = {m: np.average(each, weights=frames) for m, each in squares.items()}
-            errors = {m: float(np.sqrt(mean)) for m, mean in means.items()}
-            pooled.append(Errors(name, mine[0].unit, errors))
-    return tuple(pooled)
+def pooled_errors(gains: Iterable[Gain], component: str) -> dict[str, float]:
+    """Of the methods in one component, over all frames of the trials, so that a stride of 0.2 s
+    counts for no more than it is; trials without numbers are left out."""
+    mine = [one for one in gains if one.component == component]
+    known = [one for one in mine if np.isfinite(list(one.of.values())).all()]
+    frames = [one.frames for one in known]
+    squares = {
+        method: [one.of[method] ** 2 for one in known]
+        for method in METHODS
+        if known and all(method in one.of for one in known)
+    }
+    return {m: float(np.sqrt(np.average(x, weights=frames))) for m, x in squares.items()}
 
 
-def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: float) -> str:
-    """What one number for the whole mass does without identification, in a sentence.
-
-    rm_mass, om : relative change of RM's error by these methods; over_rm_mass : of RM+mass's by OM.
-    """
+def one_number_alone(quantity: str, rm_mass: float, om: float) -> str:
+    """What one number for the whole mass does without identification, in a sentence; ``rm_mass`` and
+    ``om``: relative change of RM's error by these methods, -0.4 is 40 % less."""
+    over_rm_mass = (1.0 + om) / (1.0 + rm_mass) - 1.0 if rm_mass > -1.0 else np.nan
     if min(rm_mass, om) >= -SAME_WITHIN:
         gained = "neither is better than the table"
     elif over_rm_mass < -SAME_WITHIN:

@@ -54,7 +54,7 @@ def beyond(record: ParticipantRecord) -> list[tuple[Yardstick, float]]:
 def large_alone(record: ParticipantRecord, with_markers: bool = False) -> list[TrialRecord]:
     """Recordings in motion with an error of the forces, or of the markers too, beyond a yardstick."""
     asked = (COP, FORCE, MARKERS) if with_markers else (COP, FORCE)
-    found = ((trial, _large(_own(record, trial))) for trial in record.moving_trials())
+    found = ((trial, _large(_of_each(record)[trial.stem])) for trial in record.moving_trials())
     return [trial for trial, large in found if any(one.name in asked for one, _ in large)]
 
 
@@ -63,7 +63,7 @@ def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | N
     sizes = {
         trial.stem: size
         for trial in record.moving_trials()
-        for one, size in _own(record, trial)
+        for one, size in _of_each(record)[trial.stem]
         if one == yardstick and np.isfinite(size)
     }
     worst = max(sizes, key=sizes.__getitem__, default="")
@@ -72,7 +72,7 @@ def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | N
 
 def largest_in(record: ParticipantRecord, trial: TrialRecord) -> tuple[TrialRecord, Yardstick]:
     """The recording, and which of its errors of the forces is farthest beyond its yardstick."""
-    own = [pair for pair in _own(record, trial) if pair[0].name != MARKERS]
+    own = [pair for pair in _of_each(record)[trial.stem] if pair[0].name != MARKERS]
     return trial, max(own, key=lambda pair: np.nan_to_num(pair[1]) / pair[0].limit)[0]
 
 
@@ -100,8 +100,10 @@ def _measured(
     return tuple((one, values[one.name]) for one in yardsticks(*limits))
 
 
-def _own(record: ParticipantRecord, trial: TrialRecord) -> tuple[tuple[Yardstick, float], ...]:
-    return _measured(record, [trial], trial.markers_mm())
+@_once
+def _of_each(record: ParticipantRecord) -> dict[str, tuple[tuple[Yardstick, float], ...]]:
+    """The yardsticks with the numbers of each recording, by its stem."""
+    return {one.stem: _measured(record, [one], one.markers_mm()) for one in record.trials}
 
 
 def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
@@ -139,7 +141,7 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     worst = worst_of(record, found[0][0])
     if worst is not None:
         said += f", most in {names_of(record)[worst.stem]}"
-        own = next(size for one, size in _own(record, worst) if one == found[0][0])
+        own = next(size for one, size in _of_each(record)[worst.stem] if one == found[0][0])
         if (size := number(own)) != number(found[0][1]):  # of all recordings together
             said += f" ({size} {found[0][0].brief_unit()})"
     why = "" if all(one.name == MARKERS for one, _ in found) else _why_large(record, worst)
@@ -277,7 +279,7 @@ def _use_of(
     if trial.kinematics is None or trial.kinematics.empty:
         return Use("out", "no motion was computed")
     found = {k: cause for k, cause in causes.items() if _concerns(cause, trial)}
-    large = sorted(_large(_own(record, trial)), key=lambda pair: -pair[1] / pair[0].limit)
+    large = sorted(_large(_of_each(record)[trial.stem]), key=lambda pair: -pair[1] / pair[0].limit)
     sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
     if MARKERS in sizes:
         return Use("out", listing([*sizes.values()]), sizes[MARKERS])
@@ -286,7 +288,9 @@ def _use_of(
     if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
         after = f"after {moved}" if moved else ""
         return Use("motion", "; ".join(filter(None, (listing(wrong), after))), after or wrong[0])
-    if not any(np.isfinite(size) for one, size in _own(record, trial) if one.name != MARKERS):
+    if not any(
+        np.isfinite(size) for one, size in _of_each(record)[trial.stem] if one.name != MARKERS
+    ):
         return Use("motion", "forces could not be compared")
     correct = findings([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
     if correct:

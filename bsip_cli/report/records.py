@@ -121,10 +121,14 @@ class ParticipantRecord:
     def use(self, movement: str = "all") -> str:
         """The method whose parameters are to be used, in one movement or mostly; the table's where
         nothing was chosen."""
-        if self.choice is None or self.choice.empty:
-            return RM
-        chosen = self.choice.set_index("movement")["use"]
-        return str(chosen.get(movement, chosen.iloc[0]))
+        chosen = self._chosen
+        return chosen.get(movement, next(iter(chosen.values()), RM))
+
+    @cached_property
+    def _chosen(self) -> dict[str, str]:
+        """By movement."""
+        table = self.choice
+        return {} if table is None else dict(zip(table["movement"], table["use"], strict=True))
 
     def use_words(self) -> str:
         """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""

@@ -388,7 +388,7 @@ def consequences(
 def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
-    known = [EFFECT_WORDS[one.effect].follows for one in cause if one.effect in EFFECT_WORDS]
+    known = [EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS]
     if len(cause) == 1 and cause[0].effect == UNNAMED:
         check = check_for(cause[0].target, [size.name for size in cause[0].numbers])
         known = [replace(known[0], action=check or known[0].action)]

@@ -98,7 +98,7 @@ def test_every_fault_stands_under_what_follows_from_it():
     for effect in CATALOGUE:
         (section,) = (one for one in sections if f"({effect.name}.md)" in one)
         words = EFFECT_WORDS[effect.name]
-        assert section.lower().startswith(words.family) and words.follows.sentence in section
+        assert section.lower().startswith(words.family) and words.sentence in section
 
 
 def test_option_with_unit_limits_and_reason():

@@ -66,10 +66,8 @@ def test_the_verdict_says_what_how_large_how_sure_and_where(found):
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
     )
-    assert (
-        text.count(EFFECT_WORDS["plate_rotation"].follows.sentence) == 1
-    )  # plate_zero's is the same
-    assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].follows.sentence}" in text
+    assert text.count(EFFECT_WORDS["plate_rotation"].sentence) == 1  # plate_zero's is the same
+    assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].sentence}" in text
     group = found.replace({"effect": {"added_mass": "plate_gain"}})
     assert "Findings 1 and 2: The measured forces" in text_of(group, detection(TRIALS))
     assert "Finding 1: It is a matter of the laboratory" in text  # the group may be the person's
@@ -231,7 +229,7 @@ def test_something_that_cannot_be_named(found):
     check = (
         "It acts like constant offset of a plate's channel (plate 1, vertical force); to check, "
     )
-    assert f"{EFFECT_WORDS[UNNAMED].follows.meaning} {check}step off the plate" in text
+    assert f"{EFFECT_WORDS[UNNAMED].meaning} {check}step off the plate" in text
     assert "bsip extend" not in text  # what has no name cannot be put into a model
 
 
@@ -323,7 +321,7 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
     text = text_of(group, detection(TRIALS))
     assert "(b) soft tissue moves: its markers are 12 mm off, probability 38.0 %." in text
     assert text.count("a second bend and soft tissue") == 0 and text.count(remedy) == 1
-    assert EFFECT_WORDS[SOFT_TISSUE].follows.sentence in text
+    assert EFFECT_WORDS[SOFT_TISSUE].sentence in text
 
 
 def test_what_an_error_of_unknown_cause_asks_to_check():

@@ -1,6 +1,8 @@
 """What ``bsip show`` prints of a diagnosis: lines that fit, and nothing that a file could hide."""
 
+import os
 from dataclasses import replace
+from unittest.mock import patch
 
 import pandas as pd
 
@@ -12,7 +14,8 @@ TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
 
 def text_of(table: pd.DataFrame, columns: int = 100, right: tuple[str, ...] = ()) -> str:
-    return verdict_text("sub-01", verdict_of(table, detection(TRIALS)), right, columns)
+    with patch.dict(os.environ, COLUMNS=str(columns)):
+        return verdict_text("sub-01", verdict_of(table, detection(TRIALS)), right)
 
 
 def test_causes_are_numbered_and_lines_fit():

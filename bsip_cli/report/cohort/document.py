@@ -33,7 +33,6 @@ from bsip_cli.report.cohort.record import (
     Cause,
     CohortRecord,
     Member,
-    Ratios,
     Searched,
     named_people,
     shared_causes,
@@ -274,7 +273,10 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         else "OM follows better than RM and RM+mass in every component.",
         "warning" if worse else "good",
     )
-    yield from _one_number(ratios)
+    if (name := "grf_vertical") in names:
+        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
+        if np.isfinite(rm_mass):
+            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om))
     others = [method for method in METHODS if method != RM]
     of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
     where = "held-out data" if ratios.held_out else "the data that identified the parameters"
@@ -287,15 +289,6 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         f"Change of the error from RM. The same: within {percent(SAME_WITHIN)} %.",
         groups=(("", 1), ("typical change [%]", 2), ("number of participants", 4)),
     )
-
-
-def _one_number(ratios: Ratios) -> Iterator[Block]:
-    name = "grf_vertical"
-    if name in ratios.of_component:
-        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
-        if np.isfinite(rm_mass):
-            over = (1 + om) / (1 + rm_mass) - 1
-            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om, over))
 
 
 def _typical(ratios: np.ndarray) -> float:

@@ -4,132 +4,151 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.legend_handler import HandlerTuple
-from matplotlib.patches import Patch
-from matplotlib.ticker import NullLocator
 
 from bsip_cli.report.blocks import Bar
 from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills
 from bsip_cli.report.figures import canvas
+from bsip_cli.report.figures.canvas import BELOW_WITH_TITLE, MM, WIDTH, Axes, Figure
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.samples import Z95
 
+_TOP, _RIGHT, _BESIDE = 6.0, 8.0, 10.0  # room at the edges, and between labels and axes
+
 # --- bars: errors cut into what makes them, residuals of markers, masses of segments ---------------
 
-_HEIGHT = 0.7  # of a bar, from one to the next
+_ROW = 17.0  # from one bar to the next
+_BAR = 0.7  # of that, its height
 _TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
-@canvas.house_style()
-def error_bars(bars: Sequence[Bar], first: Sequence[Piece] = ()) -> Figure:
-    """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``first``:
+def error_bars(bars: Sequence[Bar], order: Sequence[Piece]) -> Figure:
+    """One bar each; what makes the error smaller stands left of zero. Hatched: unknown. ``order``:
     pieces whose order, and hatching of faults, are those of the first page's bar."""
     shown = {piece.label for bar in bars for piece in bar.pieces}
-    figure = canvas.new_figure(max(24.0, 14.0 + 2.2 * len(shown)) + 6.0 * len(bars))
-    axes = figure.add_subplot()
-    fill = fills([*first, *(piece for bar in bars for piece in bar.pieces)])
-    ends = np.zeros((len(bars), 2))  # left of zero, right of it
-    handles: dict[str, Any] = {}
+    fill = fills([*order, *(piece for bar in bars for piece in bar.pieces)])
     last = (NOISE, UNKNOWN)
-    labels = (*(one for one in fill if one not in last), *last)
-    for label in (one for one in labels if one in shown):
-        shares = [sum(p.share for p in bar.pieces if p.label == label) for bar in bars]
-        handles[label] = _draw_shares(axes, np.array(shares), ends, fill[label])
-    axes.axvline(0.0, color=canvas.INK, lw=0.9)
-    axes.set_yticks(range(len(bars)), [bar.title for bar in bars])
-    axes.set_ylim(len(bars) - 0.5, -0.5)
-    axes.set_xlabel("share of the squared error [%]")
-    canvas.tidy(axes, grid="x")
-    how: dict[str, Any] = {"handler_map": {tuple: HandlerTuple(ndivide=None, pad=0.0)}}
-    how |= {"loc": "outside upper center", "ncols": 2, "frameon": False, "fontsize": 7.5}
-    figure.legend(list(handles.values()), list(handles), **how)
+    labels = [one for one in (*(x for x in fill if x not in last), *last) if one in shown]
+    shares = np.array(
+        [[sum(p.share for p in bar.pieces if p.label == x) for bar in bars] for x in labels]
+    )
+    ends = np.array([np.minimum(shares, 0.0).sum(axis=0), np.maximum(shares, 0.0).sum(axis=0)])
+    top = _TOP + canvas.LEGEND_ROW * -(-len(labels) // 2) + 4.0
+    figure = Figure(top + _ROW * len(bars) + BELOW_WITH_TITLE)
+    left = canvas.width_of(bar.title for bar in bars) + _BESIDE
+    place = left, top, WIDTH - left - _RIGHT, _ROW * len(bars)
+    axes = Axes(figure, *place, (1.05 * ends.min(), 1.05 * ends.max()), (len(bars) - 0.5, -0.5))
+    titles = {float(k): bar.title for k, bar in enumerate(bars)}
+    axes.frame(canvas.ticks(*axes.x, 8), titles, "x", x_title="share of the squared error [%]")
+    ends = np.zeros((2, len(bars)))  # left of zero, right of it, so far
+    for label, of_label in zip(labels, shares, strict=True):
+        for row, share in enumerate(of_label):
+            if share != 0.0:
+                start = ends[int(share > 0.0), row]
+                first, last = axes.at([start, start + share], row + np.array([-0.5, 0.5]) * _BAR)
+                _fill(figure, first, last, fill[label])
+                ends[int(share > 0.0), row] += share
+    figure.line(axes.at(0.0, axes.y), canvas.INK, 0.9)
+    keys = {one: partial(_fill_key, figure, fill[one]) for one in labels}
+    figure.legend(keys, (left, _TOP), columns=2, size=7.5)
     return figure
 
 
-def _draw_shares(axes: Axes, shares: np.ndarray, ends: np.ndarray, fill: Fill) -> tuple[Patch, ...]:
-    """Add a piece to each bar, several colours one above the other; return what stands for it in the
-    legend. ends (b, 2), changed : where each bar ends so far, left of zero and right of it."""
-    rows = np.arange(len(shares))
-    side = (shares > 0).astype(int)
-    start = ends[rows, side]
-    height = _HEIGHT / len(fill.colours)
-    patches = []
-    for k, colour in enumerate(fill.colours):
-        style: dict[str, Any] = {"facecolor": colour, "hatch": fill.hatch, "edgecolor": canvas.INK}
-        at = rows - _HEIGHT / 2 + (k + 0.5) * height
-        axes.barh(at, shares, left=start, height=height, lw=0.5, **style)
-        patches.append(Patch(lw=0.5, **style))
-    ends[rows, side] += shares
-    return tuple(patches)
+def _fill(figure: Figure, first: np.ndarray, last: np.ndarray, fill: Fill) -> None:
+    """Between two corners; several colours one above the other."""
+    heights = np.linspace(first[1], last[1], len(fill.colours) + 1)
+    for colour, above, below in zip(fill.colours, heights, heights[1:], strict=False):
+        ends = np.array([first[0], above]), np.array([last[0], below])
+        figure.box(*ends, figure.hatched(colour, fill.hatch), stroke=canvas.INK, stroke_width=0.5)
 
 
-@canvas.house_style()
+def _fill_key(figure: Figure, fill: Fill, x: float, y: float) -> None:
+    _fill(figure, np.array([x, y - 3.0]), np.array([x + canvas.KEY, y + 3.0]), fill)
+
+
 def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> Figure:
     """A bar per marker; the line is the limit."""
-    figure = canvas.new_figure(52)
-    axes = figure.add_subplot()
-    colours = np.where(rms_mm > limit_mm, canvas.ORANGE, canvas.BLUE)
-    axes.bar(range(len(markers)), rms_mm, color=colours)
-    axes.axhline(limit_mm, color=canvas.INK, lw=0.9, ls="--")
-    axes.set_xticks(range(len(markers)), [canvas.plain(name) for name in markers], rotation=90)
-    axes.set_xlim(-0.6, len(markers) - 0.4)
-    axes.set_ylabel("distance [mm]")
-    canvas.tidy(axes)
-    axes.tick_params(axis="x", labelsize=6.5)
+    figure, size = Figure(52.0 * MM), 6.5
+    labels = {float(k): canvas.plain(name) for k, name in enumerate(markers)}
+    left, below = 38.0, canvas.width_of(labels.values(), size) + _BESIDE
+    place = left, _TOP, WIDTH - left - _RIGHT, figure.height - _TOP - below
+    most = 1.05 * max(limit_mm, rms_mm.max())
+    axes = Axes(figure, *place, (-0.6, len(markers) - 0.4), (0.0, most))
+    axes.frame({}, canvas.ticks(*axes.y, 5))
+    figure.text((10.0, _TOP + axes.height / 2), "distance [mm]", 8.5, True, text_anchor="middle")
+    for (k, label), rms in zip(labels.items(), rms_mm, strict=True):
+        colour = canvas.ORANGE if rms > limit_mm else canvas.BLUE
+        figure.box(axes.at(k - 0.4, 0.0), axes.at(k + 0.4, rms), colour)
+        x, y = axes.at(k, 0.0)
+        figure.text((x + 0.36 * size, y + 4.0), label, size, turned=True, text_anchor="end")
+    figure.line(axes.at(axes.x, limit_mm), canvas.INK, 0.9, "3.3 1.4")
     return figure
 
 
-def _ticks(axes: Axes, low: float, high: float) -> None:
-    axes.set_xlim(low, high)
-    ticks = [t for t in _TICKS if low <= t <= high]
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+def _log_ticks(low: float, high: float) -> dict[float, str]:
+    return {float(t): f"{t:g}" for t in _TICKS if low <= t <= high}
 
 
-@canvas.house_style()
 def segment_masses(data: pd.DataFrame) -> Figure:
     """Three panels over the segments (the index): masses ``rm_kg, rm_mass_kg, om_kg``, OM - RM with
     95 % intervals (``om_sd_kg``), and in 0..1 how much the data decide (``data_share``)."""
-    rows = np.arange(len(data))
-    figure = canvas.new_figure(22.0 + 4.8 * len(rows))
-    masses, differences, shares = figure.subplots(1, 3, sharey=True, width_ratios=(3, 3, 1.5))
-    positive = data["om_kg"].where(data["om_kg"] > 0.0)
-    own = ((RM, data["rm_kg"], 24), (RM_MASS, data["rm_mass_kg"], 9), (OM, positive, 16))
-    for method, kg, size in own:
+    n, rows, top = len(data), np.arange(len(data)), _TOP + canvas.LEGEND_ROW + 2.0
+    figure = Figure(top + 13.6 * n + BELOW_WITH_TITLE)
+    left, gap = canvas.width_of(data.index) + _BESIDE, 16.0
+    part = (WIDTH - left - _RIGHT - 2 * gap) / 7.5
+    height = 13.6 * n
+    om = data["om_kg"].where(data["om_kg"] > 0.0)
+    known = np.concatenate([data["rm_kg"], om])
+    ends = float(np.nanmin(known) / 1.35), float(np.nanmax(known) * 1.35)
+    labels = {float(k): str(name) for k, name in enumerate(data.index)}
+    masses = Axes(figure, left, top, 3 * part, height, ends, (n - 0.5, -0.5), is_log=True)
+    masses.frame(_log_ticks(*ends), labels, "xy", x_title="mass [kg] (log scale)")
+    keys = {}
+    for method, kg, size in (
+        (RM, data["rm_kg"], 4.9),
+        (RM_MASS, data["rm_mass_kg"], 3.0),
+        (OM, om, 4.0),
+    ):
         line = canvas.line_of(method)
-        style = {"facecolor": "white" if method == RM else line.colour, "edgecolor": line.colour}
-        masses.scatter(kg, rows, marker=line.marker, s=size, label=method, **style)
-    masses.set_xscale("log")
-    both = np.concatenate([data["rm_kg"], positive])
-    _ticks(masses, np.nanmin(both) / 1.35, np.nanmax(both) * 1.35)
-    masses.set_xlabel("mass [kg] (log scale)")
-    canvas.legend_above(masses)
-    differences.axvline(0.0, color=canvas.ORANGE, lw=1.2, ls="--")
-    spread = np.nan_to_num(Z95 * data["om_sd_kg"])
-    dots: dict[str, Any] = {"fmt": "o", "ms": 4, "color": canvas.BLUE}
-    dots |= {"ecolor": canvas.SOFT, "elinewidth": 1.1, "capsize": 2}
-    differences.errorbar(data["om_kg"] - data["rm_kg"], rows, xerr=spread, **dots)
-    differences.set_xlabel("OM − RM [kg], 95 % interval")
-    shares.barh(rows, 100.0, height=0.55, color=canvas.FAINT)
-    shares.barh(rows, np.nan_to_num(100.0 * data["data_share"]), height=0.55, color=canvas.BLUE)
-    shares.set_xlim(0.0, 100.0)
-    shares.set_xlabel("data decide [%]")
-    for axes in (masses, differences, shares):
-        canvas.tidy(axes, grid="both")
-    masses.set_yticks(rows, data.index)
-    masses.set_ylim(len(rows) - 0.4, -0.6)
+        how = (line.marker, size, "#ffffff" if method == RM else line.colour, line.colour, 1.0)
+        figure.dots(masses.at(kg.to_numpy(), rows), *how)
+        keys[method] = partial(_dot_key, figure, *how)
+    figure.legend(keys, (left, _TOP))
+    change = (data["om_kg"] - data["rm_kg"]).to_numpy()
+    half = np.nan_to_num(Z95 * data["om_sd_kg"].to_numpy())
+    ends, silent = canvas.span(change - half, change + half, [0.0]), dict.fromkeys(labels, "")
+    left += 3 * part + gap
+    differences = Axes(figure, left, top, 3 * part, height, ends, masses.y)
+    title = "OM − RM [kg], 95 % interval"
+    differences.frame(canvas.ticks(*ends, 5), silent, "xy", x_title=title)
+    figure.line(differences.at(0.0, masses.y), canvas.ORANGE, 1.2, "4.4 1.9")
+    reach = differences.at([change - half, change + half], rows)  # (2, n, 2)
+    figure.line(reach.swapaxes(0, 1), canvas.SOFT, 1.1)
+    caps = reach.reshape(-1, 1, 2) + np.array([[0.0, -2.0], [0.0, 2.0]])
+    figure.line(caps, canvas.SOFT, 1.0)
+    figure.dots(differences.at(change, rows), "o", 5.0, canvas.BLUE)
+    left += 3 * part + gap
+    shares = Axes(figure, left, top, 1.5 * part, height, (0.0, 100.0), masses.y)
+    shares.frame(canvas.ticks(0.0, 100.0, 2), silent, "xy", x_title="data decide [%]")
+    for row, share in enumerate(np.nan_to_num(100.0 * data["data_share"].to_numpy())):
+        for end, colour in ((100.0, canvas.FAINT), (share, canvas.BLUE)):
+            figure.box(shares.at(0.0, row - 0.275), shares.at(end, row + 0.275), colour)
     return figure
+
+
+def _dot_key(
+    figure: Figure, marker: str, size: float, fill: str, edge: str, width: float, x: float, y: float
+) -> None:
+    figure.dots(np.array([[x + canvas.KEY / 2, y]]), marker, size, fill, edge, width)
 
 
 # --- a dot per person: errors and their yardsticks, and what identification gains -----------------
 
 _SPREAD = 0.28
+_MANY_PEOPLE = 200  # from here on dots are smaller
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,80 +165,78 @@ class Strip:
     end: float
 
 
-@canvas.house_style()
 def strips(data: Sequence[Strip]) -> Figure:
     """Side by side; light blue is as good as published, above the red line is large."""
-    figure = canvas.new_figure(70.0)
-    panels = figure.subplots(1, len(data), squeeze=False)[0]
-    for axes, strip in zip(panels, data, strict=True):
-        _draw_strip(axes, strip)
+    figure = Figure(70.0 * MM)
+    width = (WIDTH - _RIGHT) / len(data)
+    for k, strip in enumerate(data):
+        place = 22.0 + k * width, 18.0, width - 26.0, figure.height - 26.0
+        _draw_strip(Axes(figure, *place, (-0.6, 0.9), (0.0, strip.end)), strip)
     return figure
 
 
 def _draw_strip(axes: Axes, strip: Strip) -> None:
-    known = np.flatnonzero(np.isfinite(strip.values))
-    offsets = np.linspace(-_SPREAD, _SPREAD, len(known)) if len(known) > 1 else np.zeros(len(known))
-    axes.axhspan(0.0, strip.good, color="#cfe3f2", lw=0)
-    axes.axhline(strip.limit, color="#b30000", lw=1.2)
-    colours = np.where(strip.far[known], canvas.ORANGE, canvas.BLUE)
-    many = len(known) > canvas.MANY_PEOPLE
-    style: dict[str, Any] = {"s": 8 if many else 22, "rasterized": many}
-    beyond = strip.values[known] > strip.end
-    for marker, mine, most in (("o", ~beyond, strip.end), ("^", beyond, 0.98 * strip.end)):
-        values = np.minimum(strip.values[known][mine], most)
-        axes.scatter(offsets[mine], values, c=colours[mine], marker=marker, **style)
-    for x, k in zip(offsets, known, strict=True):
-        if strip.far[k]:
-            value, name = float(strip.values[k]), canvas.plain(strip.names[k])
-            name, lift = (f"{name}: {value:.3g}", -9) if value > strip.end else (name, 3)
-            place = (x, min(value, strip.end))
-            axes.annotate(name, place, (5, lift), textcoords="offset points", size=7)
+    figure, known = axes.figure, np.flatnonzero(np.isfinite(strip.values))
+    figure.box(axes.at(axes.x[0], 0.0), axes.at(axes.x[1], strip.good), "#cfe3f2")
+    axes.frame({}, canvas.ticks(*axes.y, 8), title=strip.title)
+    figure.line(axes.at(axes.x, strip.limit), "#b30000", 1.2)
+    offsets = _offsets(len(known))
+    values, far = strip.values[known], strip.far[known]
+    beyond = values > strip.end
+    points = axes.at(offsets, np.minimum(values, np.where(beyond, 0.98, 1.0) * strip.end))
+    size = 2.8 if len(known) > _MANY_PEOPLE else 5.4
+    for marker, mine in (("o", ~beyond), ("^", beyond)):
+        for colour, which in ((canvas.BLUE, ~far), (canvas.ORANGE, far)):
+            if (mine & which).any():
+                figure.dots(points[mine & which], marker, size, colour)
+    for k in np.flatnonzero(far):
+        name, (x, y) = canvas.plain(strip.names[known[k]]), axes.at(offsets[k], values[k])
+        place = x + 5.0, y - 3.0
+        if beyond[k]:
+            name, place = f"{name}: {values[k]:.3g}", (x + 5.0, axes.top + 9.0)
+        figure.text(place, name, 7.0)
     if len(known):
-        middle = min(float(np.median(strip.values[known])), strip.end)
-        axes.hlines(middle, -0.42, 0.42, color=canvas.INK, lw=1.4)
-    axes.set_xlim(-0.6, 0.9)
-    axes.set_ylim(0.0, strip.end)
-    axes.set_xticks([])
-    axes.set_title(strip.title, fontsize=8, loc="left")
-    canvas.tidy(axes)
+        middle = min(float(np.median(values)), strip.end)
+        figure.line(axes.at([-0.42, 0.42], middle), canvas.INK, 1.4)
 
 
-@canvas.house_style()
+def _offsets(people: int) -> np.ndarray:
+    """(p,) beside the middle, lest dots cover one another."""
+    return np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(people)
+
+
 def gain_dots(components: Sequence[str], ratios: Mapping[str, np.ndarray]) -> Figure:
     """A row per component; of each method (c, p) its error over RM's, a dot per person, a line at
     the geometric mean."""
-    rows = len(components)
-    figure = canvas.new_figure(24.0 + 8.0 * rows)
-    axes = figure.add_subplot()
-    for method, table in ratios.items():
-        for row, of_row in enumerate(table):
-            _draw_gains(axes, method, row, of_row)
-    axes.axvline(1.0, color=canvas.SOFT, lw=1.0)
+    rows, top = len(components), _TOP + canvas.LEGEND_ROW + 2.0
+    figure = Figure(top + 8.0 * MM * rows + BELOW_WITH_TITLE)
     everything = np.concatenate(list(ratios.values()))
     low = min(0.5, float(np.nanmin(everything))) / 1.15
     high = max(2.0, float(np.nanmax(everything))) * 1.15
-    axes.set_xscale("log")
-    _ticks(axes, low, high)
-    canvas.legend_above(axes)
-    axes.set_yticks(range(rows), components)
-    axes.set_ylim(rows - 0.5, -0.5)
-    axes.set_xlabel("error over that of RM (left of 1: follows better)")
-    canvas.tidy(axes, grid="x")
-    transform = axes.get_yaxis_transform()
-    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=transform, color=canvas.FAINT, lw=0.6)
+    left = canvas.width_of(components) + _BESIDE
+    place = left, top, WIDTH - left - _RIGHT, 8.0 * MM * rows
+    axes = Axes(figure, *place, (low, high), (rows - 0.5, -0.5), is_log=True)
+    labels = {float(k): name for k, name in enumerate(components)}
+    title = "error over that of RM (left of 1: follows better)"
+    axes.frame(_log_ticks(low, high), labels, "x", x_title=title)
+    between = [axes.at(axes.x, row - 0.5) for row in range(1, rows)]
+    figure.line(np.array(between).reshape(-1, 2, 2), canvas.FAINT, 0.6)
+    figure.line(axes.at(1.0, axes.y), canvas.SOFT, 1.0)
+    people = everything.shape[1]
+    size, edge = (2.4, "") if people > _MANY_PEOPLE else (4.9, "#ffffff")
+    keys = {}
+    for method, table in ratios.items():
+        line = canvas.line_of(method)
+        how = (line.marker, size if line.marker == "o" else 0.8 * size, line.colour, edge, 0.5)
+        points = axes.at(table, np.arange(rows)[:, None] + _offsets(people))
+        figure.dots(points.reshape(-1, 2), *how)
+        known = np.flatnonzero(np.isfinite(table).any(axis=1))
+        means = np.exp(np.nanmean(np.log(table[known]), axis=1))
+        ends = known[:, None] + np.array([-0.38, 0.38])
+        figure.line(axes.at(means[:, None], ends), line.colour, 1.8)
+        keys[method] = partial(_dot_key, figure, *how)
+    figure.legend(keys, (left, _TOP))
     return figure
-
-
-def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
-    line, people = canvas.line_of(method), len(ratios)
-    many = people > canvas.MANY_PEOPLE
-    offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
-    style: dict[str, Any] = {"marker": line.marker, "color": line.colour, "edgecolor": "white"}
-    style |= {"s": 6, "lw": 0.0} if many else {"s": 24, "lw": 0.5}
-    axes.scatter(ratios, row + offsets, rasterized=many, label=method, zorder=2, **style)
-    if np.isfinite(ratios).any():
-        mean = float(np.exp(np.nanmean(np.log(ratios))))
-        axes.plot([mean, mean], [row - 0.38, row + 0.38], color=line.colour, lw=1.8, zorder=3)
 
 
 # --- signals over time, measured and by method, with bands where their errors are known -----------
@@ -241,36 +258,43 @@ class Panel:
     spreads: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
-@canvas.house_style()
 def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Figure:
     """Panels in rows of ``columns``, one legend above; bands are 95 % intervals."""
-    rows = -(-len(panels) // columns)
-    figure = canvas.new_figure(12.0 + height_mm * rows)
-    grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
-    for axes, panel in zip(grid.flat, panels, strict=False):
+    rows, pitch, top = -(-len(panels) // columns), height_mm * MM, _TOP + canvas.LEGEND_ROW
+    figure = Figure(top + pitch * rows + BELOW_WITH_TITLE - 8.0)
+    figure.legend(
+        {method: partial(_line_key, figure, method) for method in panels[0].signals}, (8.0, _TOP)
+    )
+    width = (WIDTH - _RIGHT) / columns
+    for k, panel in enumerate(panels):
+        row, column = divmod(k, columns)
+        is_last = k + columns >= len(panels)
+        place = 32.0 + column * width, top + row * pitch + 17.0, width - 36.0, pitch - 23.0
+        ends = canvas.span(panel.time_s, margin=0.0)
+        bands = (s + sign * Z95 * panel.spreads[m] for m, s in panel.signals.items()
+                 if m in panel.spreads for sign in (-1, 1))  # fmt: skip
+        axes = Axes(figure, *place, ends, canvas.span(*panel.signals.values(), *bands))
+        times = canvas.ticks(*ends, 12 // columns)
+        times = times if is_last else dict.fromkeys(times, "")
+        values = canvas.ticks(*axes.y, 5)
+        axes.frame(times, values, "y", 7.0, panel.title, "time [s]" if is_last else "")
         _draw(axes, panel)
-    for axes in grid.flat[len(panels) :]:
-        axes.set_axis_off()
-    for axes in grid[-1]:
-        axes.set_xlabel("time [s]")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=5, frameon=False, fontsize=8)
     return figure
 
 
 def _draw(axes: Axes, panel: Panel) -> None:
-    keep = canvas.thinned(len(panel.time_s))
+    figure, keep = axes.figure, canvas.thinned(len(panel.time_s))
     time = panel.time_s[keep]
+    if panel.spreads and axes.y[0] < 0.0 < axes.y[1]:
+        figure.line(axes.at(axes.x, 0.0), canvas.SOFT, 0.5)
     for method, values in panel.signals.items():
-        line = canvas.line_of(method)
-        axes.plot(time, values[keep], color=line.colour, ls=line.style, lw=line.width, label=method)
+        line, values = canvas.line_of(method), values[keep]
         if method in panel.spreads:
             half = Z95 * panel.spreads[method][keep]
-            low, high = values[keep] - half, values[keep] + half
-            axes.fill_between(time, low, high, color=line.colour, alpha=0.2, lw=0)
-    if panel.spreads:
-        axes.axhline(0.0, color=canvas.SOFT, lw=0.5, zorder=0)
-    axes.set_title(panel.title, fontsize=8, loc="left", pad=3)
-    axes.set_xlim(panel.time_s[0], panel.time_s[-1])
-    canvas.tidy(axes)
-    axes.tick_params(labelsize=7)
+            figure.band(axes.at(time, values - half), axes.at(time, values + half), line.colour)
+        figure.line(axes.at(time, values), line.colour, line.width, line.dash)
+
+
+def _line_key(figure: Figure, method: str, x: float, y: float) -> None:
+    line = canvas.line_of(method)
+    figure.line(np.array([[x, y], [x + canvas.KEY, y]]), line.colour, line.width, line.dash)

@@ -6,62 +6,69 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import posed
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
+from bsip_cli.dynamics.segment_motion import segment_motion
 from bsip_cli.report.figures import canvas
+from bsip_cli.report.figures.canvas import MM, Figure
 from bsip_cli.report.records import clock_of, flags_of, measured_of
 
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
-_WIDE_MM, _HIGH_MM = 62.0, 92.0
+_WIDE, _HIGH, _LINE = 62.0 * MM, 92.0 * MM, 10.0  # points; from one line of text to the next
 _MARGIN_M = 0.06
 _LONGEST = 30  # letters of a trial's label in a line under the figure
 _TILE_M = 0.5
 _LIMBS = {"l": ("#9a9a9a", 2.2), "r": (canvas.INK, 1.8), "": (canvas.INK, 1.8)}
 
 
-@canvas.house_style()
 def stick_figure(pose: Pose, trial: str) -> Figure:
     """Left limbs grey, right ones black; the arrow of one body weight is half as long as the
     person is tall."""
-    figure = canvas.new_figure(_HIGH_MM, _WIDE_MM)
-    axes = figure.subplots()
-    centre = pose.bones_m[0, 0]
-    steps = _TILE_M * np.arange(-1, 2)
-    ends = np.array([steps[0], steps[-1]])
-    floor = [[(x, y, 0.0) for y in ends] for x in steps]
-    floor += [[(x, y, 0.0) for x in ends] for y in steps]
-    ground = projected(np.array(floor) + np.array([*centre[:2], pose.ground_m]), centre)
-    axes.add_collection(LineCollection(list(ground), colors=canvas.FAINT, linewidths=0.6))
-    bones = projected(pose.bones_m, centre)
-    colours, widths = zip(*(_LIMBS[side] for side in pose.sides), strict=True)
-    axes.add_collection(LineCollection(list(bones), colors=colours, linewidths=widths))
-    head = projected(pose.head_m, centre)
-    axes.add_patch(Circle(tuple(head), pose.head_radius_m, fc="white", ec=canvas.INK, lw=1.4))
-    markers = projected(pose.markers_m, centre)
-    axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=canvas.BLUE, mew=0.8, label="markers")
-    points = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
-    if np.isfinite([pose.force_N, pose.force_at_m]).all():
-        foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
-        arrow = {"color": canvas.GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
-        axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
-        points += [foot[None], tip[None]]
-    everything = np.concatenate(points)
-    low, high = everything.min(axis=0) - _MARGIN_M, everything.max(axis=0) + _MARGIN_M
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
+    figure = Figure(_HIGH, _WIDE)
     force = np.linalg.norm(pose.force_N)
     lines = [
         canvas.plain(trial, _LONGEST) + f", {pose.time_s:.2f} s",
         "black: right limbs; grey: left; blue: markers",
     ]
     lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
-    figure.supxlabel("\n".join(lines), fontsize=7.5, color=canvas.SOFT)
-    axes.set_axis_off()
+    top = _HIGH - _LINE * len(lines) - 2.0
+    for k, text in enumerate(lines, start=1):
+        middle = _WIDE / 2, top + k * _LINE
+        figure.text(middle, text, 7.5, fill=canvas.SOFT, text_anchor="middle")
+    centre = pose.bones_m[0, 0]
+    steps = _TILE_M * np.arange(-1, 2)
+    ends = np.array([steps[0], steps[-1]])
+    floor = [[(x, y, 0.0) for y in ends] for x in steps]
+    floor += [[(x, y, 0.0) for x in ends] for y in steps]
+    ground = projected(np.array(floor) + np.array([*centre[:2], pose.ground_m]), centre)
+    bones, markers = projected(pose.bones_m, centre), projected(pose.markers_m, centre)
+    head, radius = projected(pose.head_m, centre), pose.head_radius_m
+    arrow = projected(np.array([pose.force_at_m, pose.tip_m()]), centre)
+    shown = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + radius]
+    shown += [arrow] if np.isfinite(arrow).all() else []
+    low = np.min([one.min(axis=0) for one in shown], axis=0) - _MARGIN_M
+    high = np.max([one.max(axis=0) for one in shown], axis=0) + _MARGIN_M
+    per_m = float(np.min(np.array([_WIDE, top]) / (high - low)))
+    shift = (np.array([_WIDE, top]) - per_m * (high - low)) / 2
+
+    def at(points: np.ndarray) -> np.ndarray:
+        across, up = np.moveaxis(per_m * (points - low) + shift, -1, 0)
+        return np.stack([across, top - up], axis=-1)
+
+    figure.line(at(ground), canvas.FAINT, 0.6)
+    for one, side in zip(bones, pose.sides, strict=True):
+        figure.line(at(one), *_LIMBS[side], stroke_linecap="square")
+    figure.dots(at(head)[None], "o", 2 * radius * per_m, "#ffffff", canvas.INK, 1.4)
+    figure.dots(at(markers), "o", 2.6, "#ffffff", canvas.BLUE, 0.8)
+    if np.isfinite(arrow).all():
+        foot, tip = at(arrow)
+        along = (tip - foot) / np.linalg.norm(tip - foot)
+        beside = np.array([-along[1], along[0]])
+        base = tip - 7.0 * along
+        figure.line(np.array([foot, base]), canvas.GREEN, 2.2)
+        head = np.array([base - 3.5 * beside, tip, base + 3.5 * beside])
+        figure.line(head, canvas.GREEN, 1.0, fill=canvas.GREEN)
     return figure
 
 
@@ -130,8 +137,9 @@ def poses_of(
         return ()
     rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
     q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
-    at = posed(body, q)
-    R, p = at.R, at.p
+    still = np.zeros((len(q), len(body.skeleton.v_names)))
+    motion = segment_motion(pinocchio_model(body), q, still, still)
+    R, p = motion.rotation, motion.position_m
     x, y = anterior / np.linalg.norm(anterior)
     axes = np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])  # forward, to the right, up
     bones = _bones(body)

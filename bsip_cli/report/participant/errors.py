@@ -139,11 +139,10 @@ def _cell(gain: errors.Gain | None, method: str) -> Cell:
 def _one_number(record: ParticipantRecord, gains: list[errors.Gain]) -> Iterator[Block]:
     held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
-    mean = {one.component: one for one in errors.pooled_gains(held_out)}.get("grf_vertical")
-    if len(rows) and mean is not None and RM_MASS in mean.of:
-        over = errors.relative_change(mean.of[RM_MASS], mean.of[OM])
-        changes = mean.change(RM_MASS), mean.change(), over
-        said = errors.one_number_alone(component_label(mean.component), *changes)
+    of = errors.pooled_errors(held_out, "grf_vertical")
+    if len(rows) and RM_MASS in of:
+        changes = (of[m] / of[RM] - 1.0 if of[RM] > 0.0 else np.nan for m in (RM_MASS, OM))
+        said = errors.one_number_alone(component_label("grf_vertical"), *changes)
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")
 
 

@@ -41,7 +41,6 @@ _TEXTS = "effect target parameter unit verdict since sentence laboratory class_i
 _NUMBERS = "estimate ci_low ci_high probability limit"
 _NOTHING: dict = dict.fromkeys(_TEXTS.split(), "") | dict.fromkeys(_NUMBERS.split(), np.nan)
 _NOTHING |= {"persons": 0, "trials": 0}
-Found = laboratory_search.Verdict | laboratory_search.Deviation
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
 
 
@@ -231,7 +230,9 @@ def _rows(
         yield from _rows_of(deviation, _counts(them, deviation.cause), cells)
 
 
-def _rows_of(found: Found, counts: tuple[int, int], cells: Mapping[str, str]) -> Iterator[dict]:
+def _rows_of(
+    found: laboratory_search.Verdict, counts: tuple[int, int], cells: Mapping[str, str]
+) -> Iterator[dict]:
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
     of_all |= {"effect": found.cause.effect, "target": found.cause.target}
@@ -264,7 +265,7 @@ def _effect(cause: laboratory_search.Cause) -> Effect:
     return STATED_MASS if cause.effect == STATED_MASS.name else EFFECTS[cause.effect]
 
 
-def _words(found: Found) -> str:
+def _words(found: laboratory_search.Verdict) -> str:
     numbers = tuple(
         Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in found.sizes
     )

@@ -406,9 +406,7 @@ def _below(place: Path) -> set[Path]:
     }
 
 
-_LIBRARIES = (
-    "clarabel ezc3d jinja2 matplotlib numba numpy pandas pin pyarrow pydantic scipy statsmodels"
-)
+_LIBRARIES = "clarabel ezc3d jinja2 numba numpy pandas pin pyarrow pydantic scipy statsmodels"
 
 
 @lru_cache(maxsize=1)

@@ -288,7 +288,7 @@ def inject_command(
         hidden = effects_of(options, 1)
         with _writing(copy):
             facts = inject_recording(source, copy, hidden)
-            record = {"effects": [effect.record() for effect in hidden], **facts}
+            record = {**facts, "effects": [effect.record() for effect in hidden]}
             write_truth(copy.with_name(f"{copy.stem}_injected.json"), record)
         click.echo(f"bsip inject: {printable(str(copy))}", err=True)
         return 0

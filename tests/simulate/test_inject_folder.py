@@ -67,6 +67,13 @@ def test_names_are_kept_and_sessions_take_part(study, changed, tmp_path):
     assert list(truth["trials"]) == ["sub-01_ses-2_task-walk_run-1", "sub-01_task-static"]
 
 
+def test_one_recording_tells_sizes_too(study, changed, tmp_path):
+    source = study / "sub-01" / "sub-01_task-static.C3D"
+    assert inject_command(source, tmp_path / "copy.c3d", [], 1, **ASKED) == 0
+    truth = json.loads((tmp_path / "copy_injected.json").read_text())
+    assert [one["size"] for one in truth["effects"]] == ASKED["sizes"]
+
+
 def test_tasks_are_told_in_sessions_too(study, changed, tmp_path):
     asked = {**ASKED, "effect_tasks": ["walk"]}
     assert inject_command(study, tmp_path / "out", ["sub-01"], 1, **asked) == 0

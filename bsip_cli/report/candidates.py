@@ -190,7 +190,7 @@ def limits_of(
 
 
 def limits_sentence(limits: Sequence[Limit]) -> str:
-    """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates, axes and recordings
+    """``Too small to see: a delay ... under 2.5 ms or ...``: of plates, axes and recordings
     the worst one; empty without examples."""
     parts = []
     known = [x for x in limits if x.parameter in ("delay", "x", "y", "gain", "mass")]
@@ -203,7 +203,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     if not parts:
         return ""
     text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-    return f"{capital(text)} might have gone unseen."
+    return f"Too small to see: {text}."
 
 
 def analysed(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:

@@ -109,8 +109,8 @@ def use_sentence(
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
     said = f"{use} {', and '.join([*others, most])}{compared}."
-    why = "fewer than 1 in 100 people have such a body; other errors made it"
-    return " ".join([said, *(f"Never use {method}: {why}." for method in rare)])
+    why = "what is wrong in the recordings gave it a body that fewer than 1 in 100 people have"
+    return " ".join([said, *(f"Do not use {method}: {why}." for method in rare)])
 
 
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:

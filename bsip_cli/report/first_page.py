@@ -44,7 +44,7 @@ from bsip_cli.report.words import (
 from bsip_cli.statistics.methods import OM, RM
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST_WORDS = 375  # 400 with the title and what stands in the figure
+_MOST_WORDS = 393  # with the title 400; the figure's few not counted
 _FINDINGS = ((2, 4), (2, 2), (2, 1), (1, 2))  # in full, and kinds that are named only
 _BRIEF_WORDS = 12  # of a finding that is named only; else its title
 _FEW = 3  # findings, whose actions are all given
@@ -273,7 +273,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
 def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str]:
     """The most important first."""
     causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
-    few = record.causes if len(record.causes) <= _FEW else causes
+    few = record.causes if len(record.causes) <= _FEW else causes or record.causes[:1]
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += _look_at(record)
     said += verdict.consequences(few, first, only_actions=True)

@@ -58,6 +58,7 @@ _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
+_NO_CAUSE = (UNKNOWN, NOISE)
 MAY_HIDE = "Faults of any size may hide behind so large an error."
 NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
@@ -161,17 +162,24 @@ def light_of(
 
 
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
-    """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
-    Errors with identified parameters are not the table's."""
-    most, is_left = main_part(budget, found, use)
+    """Of a large error, what makes most of it, one part or two: ``, most of it soft tissue (56 %)``;
+    else the largest part. Errors with identified parameters are not the table's."""
+    ranked, is_left = _ranked(budget, found, use)
     if is_left:
         return " even with OM"
-    if most is None:
+    first, second = [*ranked, None, None][:2]
+    if first is None or first.label in _NO_CAUSE:
+        if first is not None and first.label == UNKNOWN and first.share <= 50.0:
+            return f", {number(first.share, 0)} % of it unknown"
         return f", {CAUSE_UNKNOWN}"
-    if most.share >= 100.0:  # what another part takes off again is beyond the whole
-        return f", all of it {most.label}"
-    how = "most" if most.share > 50.0 else "the largest part"
-    return f", {how} of it {most.label} ({number(most.share, 0)} %)"
+    if first.share >= 100.0:  # what another part takes off again is beyond the whole
+        return f", all of it {first.label}"
+    said = f"{first.label} ({number(first.share, 0)} %)"
+    if first.share > 50.0:
+        return f", most of it {said}"
+    if second is None or second.label in _NO_CAUSE or first.share + second.share <= 50.0:
+        return f", the largest part of it {said}"
+    return f", most of it {said} and {second.label} ({number(second.share, 0)} %)"
 
 
 def main_part(
@@ -180,11 +188,19 @@ def main_part(
     """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
     that nothing is of unknown cause whose bar has no such part. And whether that is only what the
     table's parameters leave, which OM should have taken away."""
+    ranked, is_left = _ranked(budget, found, use)
+    most = next(iter(ranked), None)
+    return (None if most is None or most.label in _NO_CAUSE else most), is_left
+
+
+def _ranked(
+    budget: pd.DataFrame | None, found: Collection[str], use: str
+) -> tuple[list[Piece], bool]:
+    """The parts of `main_part`, the largest first, and whether they are what OM has left."""
     parts = () if budget is None or budget.empty else budget_words.overall_pieces(budget, found)
     ranked = sorted(parts, key=lambda one: -one.share)
     is_left = use == OM and bool(ranked) and budget_words.PARAMETERS in ranked[0].label
-    most = next(iter(ranked[is_left:]), None)
-    return (None if most is None or most.label in (UNKNOWN, NOISE) else most), is_left
+    return ranked[is_left:], is_left
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints: str = "") -> str:

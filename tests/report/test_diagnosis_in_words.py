@@ -191,7 +191,7 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert said.headline.startswith("No fault found. None of the")
     assert paragraphs(said)[1] == "Recordings analysed: basketball (run 1) and sequence (run 1)."
-    assert paragraphs(said)[2].endswith("might have gone unseen.")
+    assert paragraphs(said)[2].startswith("Too small to see: ")
 
 
 def test_a_large_error_is_one_plain_line_and_hides_faults(found):
@@ -352,8 +352,8 @@ def test_limits_are_those_of_all_recordings_and_of_what_was_not_found(found):
 def test_limits_in_a_sentence(found):
     nothing = found[found["verdict"] == "rejected"]
     assert limits_sentence(limits_of(detection(TRIALS), nothing)) == (
-        "A delay of the forces under 2.5 ms, a plate's shift under 6.0 mm or a misreading "
-        "of vertical forces under 1.1 % might have gone unseen."
+        "Too small to see: a delay of the forces under 2.5 ms, a plate's shift under "
+        "6.0 mm or a misreading of vertical forces under 1.1 %."
     )
     assert limits_sentence(()) == ""
 

@@ -46,7 +46,7 @@ def said(pose: Pose, trial: str = "squat") -> list[str]:
 def test_the_figure_shows_markers_force_and_when(pose):
     (markers,) = drawn(pose, BLUE)
     assert markers.count("M") == 4
-    assert any("measured ground force, 700 N" in line for line in said(pose))
+    assert any("ground force 700 N" in line for line in said(pose))
     assert "squat <1>, 0.25 s" in said(pose, "squat <1>")
     unmeasured = replace(pose, force_N=np.full(3, np.nan))
     assert not any("ground force" in line for line in said(unmeasured))

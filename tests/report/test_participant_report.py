@@ -273,10 +273,10 @@ def test_rm_is_used_where_nothing_is_sure(record):
     )
     assert held_out in held
     rare = record.identification.assign(rare=True)
-    assert "Never use OM" in use_sentence(record.choice, rare)
+    assert "Do not use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)
     said = use_sentence(alone, rare)
-    assert ": no recording is left to judge OM by. " in said and "Never use OM" in said
+    assert ": no recording is left to judge OM by. " in said and "Do not use OM" in said
 
 
 # --- sections -----------------------------------------------------------------------------------

@@ -103,9 +103,9 @@ def test_a_recording_with_a_fault_waits_for_what_can_be_done(record, effect, kin
 def test_forces_far_off_leave_the_motion_and_markers_far_off_nothing(record):
     far = with_error(with_faults(record), BASKETBALL, rmse_percent_bw=7.25)
     assert kinds_of(far) == ["full", "full", "motion"]
-    assert "Use only the motion: basketball (vertical force error 7.2 %)." in list(use_lines(far))
+    assert "Joint angles only: basketball (vertical force error 7.2 %)." in list(use_lines(far))
     slipped = with_faults(far, fault("marker_shift", BASKETBALL))
-    assert "Use only the motion: basketball (after finding 2)." in list(use_lines(slipped))
+    assert "Joint angles only: basketball (after finding 2)." in list(use_lines(slipped))
     moved = far.trials[2].kinematics.assign(marker_rms_m=0.0235)
     lost = with_trial(far, BASKETBALL, kinematics=moved)
     assert "Leave out: basketball (marker error 23.5 mm)." in list(use_lines(lost))
@@ -115,7 +115,7 @@ def test_forces_far_off_leave_the_motion_and_markers_far_off_nothing(record):
 
 def test_forces_that_were_not_compared_are_not_vouched_for(record):
     unknown = with_trial(with_faults(record), BASKETBALL, fit=None)
-    said = "Use only the motion: basketball (forces could not be compared)."
+    said = "Joint angles only: basketball (forces could not be compared)."
     assert said in list(use_lines(unknown))
 
 

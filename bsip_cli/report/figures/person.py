@@ -29,9 +29,9 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     force = np.linalg.norm(pose.force_N)
     lines = [
         canvas.plain(trial, _LONGEST) + f", {pose.time_s:.2f} s",
-        "black: right limbs; grey: left; blue: markers",
+        "right black, left grey",
     ]
-    lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
+    lines += [f"ground force {force:.0f} N"] if np.isfinite(force) else []
     top = _HIGH - _LINE * len(lines) - 2.0
     for k, text in enumerate(lines, start=1):
         middle = _WIDE / 2, top + k * _LINE

@@ -72,19 +72,25 @@ def test_raised_and_tilted_plates_keep_the_wrench(tmp_path, kind):
 def test_any_number_of_plates_overlapping_or_not(tmp_path, n_plates):
     force, _ = standing_wrench(N * RATIO)
     force[:, :2] = 0.0  # which would lean away from the body under one foot or the other
-    moment = np.cross(_swaying([0.2, 0.3, 0.0]), force)
     t = np.linspace(0, 9, N * RATIO)[:, None]
     shares = np.array([1.5 + np.sin((1 + 0.3 * k) * t) for k in range(n_plates)])
     shares = shares / shares.sum(axis=0) if n_plates else shares
+    # No two are loaded at one place, and none between others: in a ring.
+    angles = 2 * np.pi * np.arange(n_plates) / max(n_plates, 1)
+    places = [[0.2 + 0.08 * np.cos(a), 0.3 + 0.08 * np.sin(a), 0.0] for a in angles]
+    forces = [share * force for share in shares]
+    moments = [np.cross(_swaying(p), f) for p, f in zip(places, forces, strict=True)]
+    shifts = np.linspace(0, 0.02, max(n_plates, 1))
     specs = [
-        PlateSpec(share * force, share * moment, corners_m=CORNERS_M + np.array([x, 0, 0]))
-        for share, x in zip(shares, np.linspace(0, 0.02, max(n_plates, 1)), strict=False)
+        PlateSpec(f, m, corners_m=CORNERS_M + np.array([x, 0, 0]))
+        for f, m, x in zip(forces, moments, shifts, strict=False)
     ]
     recording = _read(tmp_path, *specs)
     assert len(recording.plates) == n_plates
     if n_plates:
         total = np.sum([plate.wrench() for plate in recording.plates], axis=0)
-        np.testing.assert_allclose(total, np.hstack([force, moment]), atol=0.1)
+        stated = np.hstack([np.sum(forces, axis=0), np.sum(moments, axis=0)])
+        np.testing.assert_allclose(total, stated, atol=0.1)
 
 
 def test_an_outline_too_small_is_widened(tmp_path):

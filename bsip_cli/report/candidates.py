@@ -16,7 +16,7 @@ import pandas as pd
 
 from bsip_cli.effects.effect import Judged, Number, Words
 from bsip_cli.report import effect_words
-from bsip_cli.report.words import capital, number, true_minus
+from bsip_cli.report.words import number, true_minus
 
 NOTHING = "none"
 UNNAMED = "unexplained"

@@ -178,7 +178,8 @@ def strips(data: Sequence[Strip]) -> Figure:
 def _draw_strip(axes: Axes, strip: Strip) -> None:
     figure, known = axes.figure, np.flatnonzero(np.isfinite(strip.values))
     figure.box(axes.at(axes.x[0], 0.0), axes.at(axes.x[1], strip.good), "#cfe3f2")
-    axes.frame({}, canvas.ticks(*axes.y, 8), title=strip.title)
+    axes.frame({}, canvas.ticks(*axes.y, 8))
+    figure.text((axes.left - 18.0, axes.top - 9.0), strip.title)  # as wide as its part
     figure.line(axes.at(axes.x, strip.limit), "#b30000", 1.2)
     offsets = _offsets(len(known))
     values, far = strip.values[known], strip.far[known]

@@ -172,6 +172,9 @@ def decided_layout(
     """
     file_size = len(content)
     stated = _by_header(header, parameters, file_size)
+    many = replace(stated, n_frames=_many_frames(parameters))
+    if many.n_frames > stated.n_frames and many.ends_with(file_size):
+        stated = many  # of the header's count the high word is lost
     other = _by_parameters(stated, parameters)
     if stated.n_frames < 1 or stated.words_per_frame < 1 or stated.start < BLOCK:
         stated = other
@@ -200,6 +203,9 @@ def decided_layout(
         raise refusal(path, f"{both}, and the file's length fits both", "one count of each")
     wanted = fitting[0]
     in_file = wanted.room(file_size) // wanted.bytes_per_frame
+    if not in_file:
+        remedy = "copy or export the trial again"
+        raise refusal(path, "the file ends before its first frame does", "a complete file", remedy)
     chosen = replace(wanted, n_frames=min(wanted.n_frames, in_file))
     said = []
     if stated != other:
@@ -217,9 +223,11 @@ def decided_layout(
 
 def _are_floats(data: bytes, header: Header) -> bool:
     """Whether coordinates and samples can be 32-bit floats: two integers hardly make such sizes."""
-    sizes = np.abs(floats(data[: len(data) // 4 * 4], header.processor))
     with np.errstate(invalid="ignore"):
-        return bool(((sizes == 0) | ((sizes > _TINY) & (sizes < _HUGE))).mean() > _MOSTLY)
+        sizes = np.abs(floats(data[: len(data) // 4 * 4], header.processor))
+    sizes = sizes[~np.isnan(sizes)]  # gaps
+    are_such = (sizes == 0) | ((sizes > _TINY) & (sizes < _HUGE))
+    return bool(len(sizes) and are_such.mean() > _MOSTLY)
 
 
 def _about_kind(read: Layout, header: Header, parameters: Parameters) -> Finding:
@@ -305,7 +313,8 @@ def decided_rate(
     analog_hz = number(parameters.get("ANALOG", {}), "RATE")
     if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
         cameras_hz = number(parameters.get("TRIAL", {}), "CAMERA_RATE")
-        others_hz = np.array([analog_hz / layout.samples_per_frame, cameras_hz])
+        of_analog_hz = analog_hz / layout.samples_per_frame if layout.n_channels else np.nan
+        others_hz = np.array([of_analog_hz, cameras_hz])
         agrees = [bool((np.abs(others_hz / one - 1) <= _SAME).any()) for one in usable]
         found = f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz"
         level = "warning"

@@ -121,7 +121,7 @@ def read_header(path: Path, content: bytes) -> Header:
     if processor not in (_PC, _DEC):
         raise BadDataError(
             f"its parameter section names processor {processor}"
-            f"{' (MIPS)' if processor == _MIPS else ''}, which ezc3d does not read",
+            f"{' (MIPS)' if processor == _MIPS else ''}, which bsip does not read",
             expected="84 (PC) or 85 (DEC)",
             remedy="export the trial again, or convert it to the PC format",
             file=path,
@@ -143,7 +143,7 @@ def read_parameters(path: Path, content: bytes, processor: int) -> Parameters:
     """All parameters by group and name; ``content`` is the file up to its data."""
     groups: dict[int, str] = {}
     values: list[tuple[int, str, Value]] = []
-    at = (content[0] - 1) * BLOCK + 4
+    at, claimed = (content[0] - 1) * BLOCK + 4, 0
     try:
         for _ in range(_MOST_RECORDS):
             if not 0 <= at < len(content):
@@ -161,7 +161,11 @@ def read_parameters(path: Path, content: bytes, processor: int) -> Parameters:
             if number < 0:
                 groups[-number] = name
             else:
-                values.append((number, name, _value(content, after + 2, name, processor)))
+                value, size = _value(content, after + 2, name, processor)
+                claimed += size
+                if claimed > len(content):
+                    raise _BrokenError(f"{name} and those before claim more bytes than there are")
+                values.append((number, name, value))
             step = content[after] + 256 * content[after + 1]
             if not step:
                 break
@@ -176,9 +180,9 @@ def read_parameters(path: Path, content: bytes, processor: int) -> Parameters:
     return found
 
 
-def _value(content: bytes, at: int, name: str, processor: int) -> Value:
+def _value(content: bytes, at: int, name: str, processor: int) -> tuple[Value, int]:
     """Of the parameter whose type stands at a byte: texts, or numbers in their shape, first index
-    fastest."""
+    fastest; and the bytes that it fills."""
     kind, rank = _signed(content[at]), content[at + 1]
     if kind not in (_TEXT, _BYTE, _INTEGER, _FLOAT) or rank > 7:
         raise _BrokenError(f"{name} has type {kind} and {rank} dimensions")
@@ -191,12 +195,12 @@ def _value(content: bytes, at: int, name: str, processor: int) -> Value:
     if kind == _TEXT:
         width, *others = shape or (1,)
         n = size // width if width else min(math.prod(others), _MOST_EMPTY) * bool(others)
-        return tuple(_text(raw[k * width : (k + 1) * width]) for k in range(n))
+        return tuple(_text(raw[k * width : (k + 1) * width]) for k in range(n)), size
     if kind == _BYTE:
         flat = np.frombuffer(raw, np.uint8)
     else:
         flat = floats(raw, processor) if kind == _FLOAT else integers(raw)
-    return flat.reshape(shape or (1,), order="F")
+    return flat.reshape(shape or (1,), order="F"), size
 
 
 def _text(raw: bytes) -> str:

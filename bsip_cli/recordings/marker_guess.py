@@ -241,7 +241,8 @@ def with_pairs_named(
     for name, count in Counter(name for name, _ in meant.values()).items():
         two = [column for column, (one, _) in meant.items() if one == name]
         may_be = {m.landmark: m for m in meant[two[0]][1]}
-        lateral = next((one for one in may_be if medial_of(one) in may_be), None)
+        pairs = (one for one in may_be if medial_of(one) and medial_of(one) in may_be)
+        lateral = next(pairs, None)
         if lateral is None or len(may_be) != 2 or count != 2:
             continue
         pair = _Pair.of(markers_m, two, to_right, lateral)

@@ -189,6 +189,7 @@ _WORDS = {
 }
 # Other words hold these too, as forearm does: they stand alone, or before an axis.
 _SHORT = {"for": "force", "mom": "moment", "cdp": "point"}
+_SHORT |= dict.fromkeys(("dx", "sx", "izq", "iz", "dch", "dcha", "esq"), "side")
 _MEANINGS = _WORDS | _SHORT | {"fp": "ground"}
 _LINKS = "of|de|di|do|da|du|des|del|della|le|la|der|am|sol|solo|axis|eje|axe|achse|asse|eixo"
 _LINKS += "|(?:d|l|dell)(?=['\N{RIGHT SINGLE QUOTATION MARK}])"

@@ -19,7 +19,7 @@ from bsip_cli.recordings.model import Finding
 
 _SKIN_M = 0.04
 _PAIR_M = 2 * _SKIN_M
-_MATES = 8
+_MATES = 8  # the nearest; of the others one may be near by chance, so that it has to be so closer
 _USUALLY = 0.2, 0.5, 0.8  # of the poses: who is off the body more often has no mates
 _MOVES = 0.8  # of the markers move less than the one by which poses are chosen: two limbs may rest
 _POSES, _FRAMES = 100, 1000
@@ -49,7 +49,8 @@ def off_the_body(positions_m: np.ndarray) -> tuple[np.ndarray, float]:
 
     A marker is off the body where its distances from all its mates have changed by more than skin
     makes of a pair, and some of these mates hold to each other; and around that, as long as most
-    have changed by more than its own skin makes, and for as long as a filter rings: as it rises.
+    have changed by more than its own skin makes, and for as long as a filter rings, alike on either
+    side: as it rises or falls, whichever is shorter.
     """
     off, furthest_m = np.zeros(positions_m.shape[:2], bool), 0.0
     if len(positions_m) < 3 or not 2 < positions_m.shape[1] <= _MOST_MARKERS:
@@ -62,7 +63,7 @@ def off_the_body(positions_m: np.ndarray) -> tuple[np.ndarray, float]:
         before = now
     surely &= ~_exchanged(surely, positions_m, body)
     for k in np.flatnonzero(surely.any(axis=0)).tolist():
-        change = body[k].change_m(positions_m)
+        change = body[k].change_m(positions_m)[:, :_MATES]
         seen = np.isfinite(change)
         size = np.sort(np.where(seen, change, 0.0), axis=1)[:, change.shape[1] // 2]
         mostly = (change > _SKIN_M).sum(axis=1) > seen.sum(axis=1) / 2
@@ -70,8 +71,8 @@ def off_the_body(positions_m: np.ndarray) -> tuple[np.ndarray, float]:
             if not surely[start:stop, k].any():
                 continue
             plateau = np.flatnonzero(size[start:stop] >= _PLATEAU * size[start:stop].max())
-            falls = stop - 1 - start - plateau[-1]
-            off[max(0, start - plateau[0]) : stop + falls, k] = True
+            rings = min(plateau[0], stop - 1 - start - plateau[-1])
+            off[max(0, start - rings) : stop + rings, k] = True
             furthest_m = max(furthest_m, float(size[start:stop].max()))
     return off & np.isfinite(positions_m).all(axis=-1), furthest_m
 
@@ -88,8 +89,8 @@ def _poses(positions_m: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Mates:
-    """Columns (k,) of the markers nearest to one of those whose distances from it stay what they
-    are but for skin, and these distances (k,)."""
+    """Columns (k,) of the markers whose distances from one stay what they are but for skin, the
+    nearest first, and these distances (k,)."""
 
     marker: int
     columns: np.ndarray
@@ -104,7 +105,7 @@ class _Mates:
         is_mate = (high - low < _SKIN_M) & (2 * count > len(ways))
         is_mate[marker] = False
         columns = np.flatnonzero(is_mate)
-        columns = columns[np.argsort(usual[columns], kind="stable")[:_MATES]]
+        columns = columns[np.argsort(usual[columns], kind="stable")]
         return cls(marker, columns, usual[columns])
 
     def change_m(self, positions_m: np.ndarray, of: int | None = None) -> np.ndarray:
@@ -120,7 +121,8 @@ class _Mates:
         """Whether the marker is none of theirs, (n_frames,) bool, but for mates that are ``off``
         (n_frames, n_markers) the body too."""
         change = self.change_m(positions_m)
-        far, near = change > _PAIR_M, change <= _PAIR_M
+        far = change > _PAIR_M
+        near = change <= np.where(np.arange(len(self.columns)) < _MATES, _PAIR_M, _SKIN_M)
         left = ~(near & ~off[:, self.columns]).any(axis=1) & (far.sum(axis=1) > 1)
         for n in np.flatnonzero(left).tolist():
             others = self.columns[far[n]].tolist()

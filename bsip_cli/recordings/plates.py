@@ -2,7 +2,7 @@
 
 Plate frame: x from corner 2 to corner 1, y from corner 4 to corner 1, z into the floor,
 origin at the centre of the surface. The channels hold the reaction on the body.
-Done here on whole arrays rather than by ezc3d's extraction, which gives the same numbers
+Done on whole arrays; ezc3d's extraction gives the same numbers
 for types 2 and 4 (a test compares), but loops over samples and gives up on all plates
 when one is described badly.
 """

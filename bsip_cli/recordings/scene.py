@@ -44,6 +44,7 @@ _CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
 
 _FEW_FRAMES = 50  # by which sides are found
+_AHEAD_OF = {"legs": "pelvis", "arms": "trunk"}  # parts of `Handedness`
 _CLEAR = 0.6  # sine of the angle from ahead to the right: 1 in a person who stands square
 
 # What is in front and behind, and what has a left and a right one, by landmarks without sides.
@@ -400,11 +401,13 @@ class Handedness:
 
     @property
     def sign(self) -> int:
-        """-1 if every part that is clear, and at least two, has left and right exchanged, 1 if none
-        has; else 0."""
-        clear = list(self._clear().values())
-        alike = len(clear) >= 2 and np.ptp(np.sign(clear)) == 0
-        return int(np.sign(clear[0])) if alike else 0
+        """-1 if every part that is clear has left and right exchanged, and at least two that know
+        by themselves what is ahead, 1 if none has; else 0."""
+        clear = self._clear()
+        signs = np.sign(list(clear.values()))
+        witnesses = {_AHEAD_OF.get(name, name) for name in clear}
+        alike = len(witnesses) >= 2 and np.ptp(signs) == 0
+        return int(signs[0]) if alike else 0
 
     def exchanged(self) -> list[str]:
         """Parts with left and right exchanged, where not all have."""

@@ -34,7 +34,7 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
 from bsip_cli.recordings.written import AS_WRITTEN, Lengths, Written
 
-# Of both files: a grid of forces may need as much memory as c3d_content allows.
+# Of both files: a grid of forces may need no more memory than this.
 _VALUES_PER_BYTE = 5
 _MM = 1e-3
 _UNEVEN = "the times of the .mot do not increase evenly"

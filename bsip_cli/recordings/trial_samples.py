@@ -322,7 +322,11 @@ class TrialSamples:
         )
 
     def without(self, plates: Collection[str]) -> TrialSamples:
-        return replace(self, sources={n: s for n, s in self.sources.items() if n not in plates})
+        sources, smooth = (
+            {name: one for name, one in of.items() if name not in plates}
+            for of in (self.sources, self.smooth)
+        )
+        return replace(self, sources=sources, smooth=smooth)
 
     def bears_all_feet(self) -> bool:
         """Whether every foot on the ground stands on one of the plates, as the file has them."""

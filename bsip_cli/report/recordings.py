@@ -164,6 +164,8 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     if part is None:
         if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
             return "other findings explain part at most"
+        if verdict.OF_IT_UNKNOWN in light_for(record).title:
+            return "" if record.causes else verdict.NONE_FOUND
         return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
     besides = " besides the table's parameters" if is_left else ""
     if number_of := _number_of(record, part):

@@ -58,6 +58,7 @@ _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No recording has motion with every contact on a plate."
 CAUSE_UNKNOWN = "cause unknown"
+OF_IT_UNKNOWN = "of it unknown"
 _NO_CAUSE = (UNKNOWN, NOISE)
 MAY_HIDE = "Faults of any size may hide behind so large an error."
 NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
@@ -170,7 +171,7 @@ def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -
     first, second = [*ranked, None, None][:2]
     if first is None or first.label in _NO_CAUSE:
         if first is not None and first.label == UNKNOWN and first.share <= 50.0:
-            return f", {number(first.share, 0)} % of it unknown"
+            return f", {number(first.share, 0)} % {OF_IT_UNKNOWN}"
         return f", {CAUSE_UNKNOWN}"
     if first.share >= 100.0:  # what another part takes off again is beyond the whole
         return f", all of it {first.label}"
@@ -198,7 +199,8 @@ def _ranked(
 ) -> tuple[list[Piece], bool]:
     """The parts of `main_part`, the largest first, and whether they are what OM has left."""
     parts = () if budget is None or budget.empty else budget_words.overall_pieces(budget, found)
-    ranked = sorted(parts, key=lambda one: -one.share)
+    whole = [one for one in parts if one.label != budget_words.REST]  # which has no name
+    ranked = sorted(whole, key=lambda one: -one.share)
     is_left = use == OM and bool(ranked) and budget_words.PARAMETERS in ranked[0].label
     return ranked[is_left:], is_left
 

@@ -84,6 +84,8 @@ DIALECTS = {  # force, point, moment of two plates
         "Moment libre {p} {A}",
         "gauche D",
     ),
+    "italian, short sides": ("F{a}_{p}", "P{a}_{p}", "M{a}_{p}", "dx sx"),
+    "spanish, short sides": ("Fuerza_{p}_{a}", "cdp_{p}_{a}", "momento_{p}_{a}", "iz dch"),
     "italian": ("{p}_forza_{a}", "{p}_centro_di_pressione_{a}", "{p}_momento_{a}", "sinistra d"),
     "portuguese": (
         "For\N{LATIN SMALL LETTER C WITH CEDILLA}a {A} ({p})",

@@ -424,3 +424,26 @@ def _worst_mm(path, length_s: float, by_segment: bool) -> float:
 def test_gaps_cut_into_real_recordings(real_data, trial, length_s, by_segment, least_mm, most_mm):
     worst_mm = _worst_mm(real_data / f"opencap_subject4/{trial}.trc", length_s, by_segment)
     assert least_mm < worst_mm < most_mm
+
+
+def test_a_hand_that_long_rests_at_the_trunk_keeps_its_only_marker():
+    """Nine of the trunk lie nearer than the elbow, from which alone it stays as far."""
+    t = np.arange(2000) / 100.0
+    trunk = np.array([[0.05 * (k % 3), 0.05 * (k // 3), 1.2] for k in range(9)])
+    raised = np.clip((t - 17.0) / 0.5, 0.0, 1.0)[:, None] * np.array([0.0, 0.4, 0.5])
+    elbow = np.array([0.2, -0.2, 1.1]) + raised
+    wrist = np.array([0.05, 0.05, 1.1]) + raised
+    markers = np.concatenate([np.tile(trunk, (2000, 1, 1)), elbow[:, None], wrist[:, None]], axis=1)
+    markers[..., 0] += 0.3 * np.sin(t)[:, None]
+    before = markers.copy()
+    assert without_absurd(markers) == []
+    np.testing.assert_array_equal(markers, before)
+
+
+def test_a_marker_that_falls_off_costs_no_frames_before():
+    walked = np.arange(900)[:, None, None] * np.array([0.01, 0.0, 0.0])
+    markers = _walking()[:1] + walked + 0.002 * np.sin(np.arange(900))[:, None, None]
+    fell = 800
+    markers[fell:, 5] = markers[fell, 5] - [0.0, 0.0, 0.5]
+    without_absurd(markers)
+    assert not np.isnan(markers[:fell]).any()

@@ -207,3 +207,8 @@ def test_whole_limbs_on_the_other_side_of_a_trunk_that_walks():
     assert exchanged(["ELB"]) == ["arms"]
     assert exchanged(["ASI", "PSI"]) == ["pelvis"]
     assert handedness(labels, markers * [1, -1, 1]).sign == -1
+    # A front and a back of the pelvis exchanged make knees wrong too: one witness, not two.
+    turned = {"ASI": "PSI", "PSI": "ASI"}
+    wrong = [label[0] + turned.get(label[1:], label[1:]) for label in labels]
+    few = [k for k, label in enumerate(labels) if label[1:] in ("ASI", "PSI", "KNE")]
+    assert handedness([wrong[k] for k in few], markers[:, few]).sign == 0

@@ -6,6 +6,7 @@ the same bytes.
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -29,6 +30,7 @@ KEY = 20.0  # width of what stands for a label in a legend
 LEGEND_ROW = 11.0
 BELOW, BELOW_WITH_TITLE = 15.0, 29.0  # room that ticks need under axes
 _TICK = 3.0
+_PLAIN_DIGITS = 5  # before or after the point, of a number that is written without exponent
 _FONTS = "'DejaVu Sans', Verdana, Arial, sans-serif"  # of much the same width
 # Of letters of DejaVu Sans, in parts of their size; all others are about 0.63 wide.
 _WIDTHS = {0.3: "ijlIJ' ,.", 0.36: "/:;|f-", 0.4: "()[]t!r", 0.9: "mwMW%@#+<=>−±→"}
@@ -162,6 +164,7 @@ class Figure:
         """Labels with what stands for each, drawn from (x, y) on, `KEY` wide, y its middle; filled
         column by column from the upper left corner ``at``, or from further left if it is too wide."""
         (left, top), labels = at, list(entries)
+        longest = int((self.width - KEY - 10.0) / (0.63 * size))
         rows = -(-len(labels) // columns)
         parts = [labels[first : first + rows] for first in range(0, len(labels), rows)]
         widths = [KEY + 22.0 + width_of(part, size) for part in parts]
@@ -170,7 +173,7 @@ class Figure:
             for k, label in enumerate(part):
                 y = top + (k + 0.5) * LEGEND_ROW
                 entries[label](left, y)
-                self.text((left + KEY + 6.0, y + 0.36 * size), label, size)
+                self.text((left + KEY + 6.0, y + 0.36 * size), plain(label, longest), size)
             left += width
 
     def svg(self) -> bytes:
@@ -247,23 +250,37 @@ def span(*values: Any, margin: float = 0.05) -> tuple[float, float]:
     every = np.concatenate([np.ravel(one) for one in values])
     known = every[np.isfinite(every)]
     low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
-    more = margin * (high - low) if high > low else 0.5
+    more = margin * (high - low) if high > low else max(0.5, 1e-6 * abs(high))
     return float(low - more), float(high + more)
 
 
 def ticks(low: float, high: float, most: int) -> dict[float, str]:
-    """About so many round numbers, with their labels."""
+    """About so many round numbers, with their labels; none where the ends are none."""
+    if not high > low:
+        return {}
     power = 10.0 ** floor(log10((high - low) / most))
     of_ten = next(x for x in (1.0, 2.0, 2.5, 5.0, 10.0) if x * power * most >= high - low)
     step, digits = of_ten * power, floor(log10(of_ten * power))
     first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
     values = step * np.arange(first, last + 1.0)
+    if abs(digits) > _PLAIN_DIGITS:
+        return {float(x): f"{x:.3g}" for x in values}
     return {float(x): number(x, max(0, (of_ten == 2.5) - digits)) for x in values}
 
 
 def width_of(labels: Iterable[str], size: float = 8.0) -> float:
     """Of the longest, about."""
-    return size * max((sum(_WIDTH_OF.get(x, 0.63) for x in one) for one in labels), default=0.0)
+    return size * max((sum(map(_letter_width, one)) for one in labels), default=0.0)
+
+
+def _letter_width(letter: str) -> float:
+    is_wide = unicodedata.east_asian_width(letter) in "WF"
+    return 1.0 if is_wide else _WIDTH_OF.get(letter, 0.63)
+
+
+def columns_for(labels: Iterable[str], most: int, size: float = 8.0) -> int:
+    """Of a legend across a figure, at most so many."""
+    return max(1, min(most, int(WIDTH // (KEY + 22.0 + width_of(labels, size)))))
 
 
 def plain(text: str, longest: int = LONGEST_LABEL) -> str:

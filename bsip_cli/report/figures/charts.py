@@ -36,7 +36,8 @@ def error_bars(bars: Sequence[Bar], order: Sequence[Piece]) -> Figure:
         [[sum(p.share for p in bar.pieces if p.label == x) for bar in bars] for x in labels]
     )
     ends = np.array([np.minimum(shares, 0.0).sum(axis=0), np.maximum(shares, 0.0).sum(axis=0)])
-    top = _TOP + canvas.LEGEND_ROW * -(-len(labels) // 2) + 4.0
+    columns = canvas.columns_for(labels, 2, 7.5)
+    top = _TOP + canvas.LEGEND_ROW * -(-len(labels) // columns) + 4.0
     figure = Figure(top + _ROW * len(bars) + BELOW_WITH_TITLE)
     left = canvas.width_of(bar.title for bar in bars) + _BESIDE
     place = left, top, WIDTH - left - _RIGHT, _ROW * len(bars)
@@ -53,7 +54,7 @@ def error_bars(bars: Sequence[Bar], order: Sequence[Piece]) -> Figure:
                 ends[int(share > 0.0), row] += share
     figure.line(axes.at(0.0, axes.y), canvas.INK, 0.9)
     keys = {one: partial(_fill_key, figure, fill[one]) for one in labels}
-    figure.legend(keys, (left, _TOP), columns=2, size=7.5)
+    figure.legend(keys, (left, _TOP), columns, 7.5)
     return figure
 
 
@@ -170,7 +171,7 @@ def strips(data: Sequence[Strip]) -> Figure:
     figure = Figure(70.0 * MM)
     width = (WIDTH - _RIGHT) / len(data)
     for k, strip in enumerate(data):
-        place = 22.0 + k * width, 18.0, width - 26.0, figure.height - 26.0
+        place = 26.0 + k * width, 18.0, width - 30.0, figure.height - 26.0
         _draw_strip(Axes(figure, *place, (-0.6, 0.9), (0.0, strip.end)), strip)
     return figure
 
@@ -179,7 +180,7 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
     figure, known = axes.figure, np.flatnonzero(np.isfinite(strip.values))
     figure.box(axes.at(axes.x[0], 0.0), axes.at(axes.x[1], strip.good), "#cfe3f2")
     axes.frame({}, canvas.ticks(*axes.y, 8))
-    figure.text((axes.left - 18.0, axes.top - 9.0), strip.title)  # as wide as its part
+    figure.text((axes.left - 22.0, axes.top - 9.0), strip.title)  # as wide as its part
     figure.line(axes.at(axes.x, strip.limit), "#b30000", 1.2)
     offsets = _offsets(len(known))
     values, far = strip.values[known], strip.far[known]
@@ -195,7 +196,9 @@ def _draw_strip(axes: Axes, strip: Strip) -> None:
         place = x + 5.0, y - 3.0
         if beyond[k]:
             name, place = f"{name}: {values[k]:.3g}", (x + 5.0, axes.top + 9.0)
-        figure.text(place, name, 7.0)
+        fits = place[0] + canvas.width_of([name], 7.0) <= axes.left + axes.width
+        anchor = "start" if fits else "end"
+        figure.text((place[0] - 10.0 * (not fits), place[1]), name, 7.0, text_anchor=anchor)
     if len(known):
         middle = min(float(np.median(values)), strip.end)
         figure.line(axes.at([-0.42, 0.42], middle), canvas.INK, 1.4)
@@ -270,7 +273,7 @@ def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Fi
     for k, panel in enumerate(panels):
         row, column = divmod(k, columns)
         is_last = k + columns >= len(panels)
-        place = 32.0 + column * width, top + row * pitch + 17.0, width - 36.0, pitch - 23.0
+        place = 38.0 + column * width, top + row * pitch + 17.0, width - 42.0, pitch - 23.0
         ends = canvas.span(panel.time_s, margin=0.0)
         bands = (s + sign * Z95 * panel.spreads[m] for m, s in panel.signals.items()
                  if m in panel.spreads for sign in (-1, 1))  # fmt: skip

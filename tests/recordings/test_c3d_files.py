@@ -268,3 +268,39 @@ def test_size_of_one_channel(two_plates, value):
     _write(two_plates, place, 1, float(value))
     said = [f"ANALOG:GEN_SCALE times SCALE is {value}"] if value != "0.5" else []
     assert _excluded(two_plates) == (2 - len(said), said)
+
+
+def test_a_file_that_ends_before_its_first_frame(path):
+    content = path.read_bytes()
+    start = 512 * (struct.unpack_from("<H", content, 16)[0] - 1)
+    path.write_bytes(content[: start + 100])
+    with pytest.raises(BadDataError, match="ends before its first frame|a complete file"):
+        read_content(path)
+
+
+def test_gaps_written_as_nan_are_no_sign_of_integers(path):
+    raw = bytearray(path.read_bytes())
+    raw[12:16] = np.float32(1.0).tobytes()  # a header that calls floats integers
+    start, words = 512 * (struct.unpack_from("<H", raw, 16)[0] - 1), len(standing_markers(N)[1]) * 4
+    frame = 4 * (words + 6 * 10)
+    for k in range(N):  # each third marker is not seen
+        for marker in range(0, words // 4, 3):
+            at = start + k * frame + 16 * marker
+            raw[at : at + 12] = np.full(3, np.nan, np.float32).tobytes()
+    path.write_bytes(raw)
+    positions = read_content(path).positions
+    markers = 1e3 * standing_markers(N)[0]
+    seen = [k for k in range(words // 4) if k % 3]
+    np.testing.assert_allclose(positions[:, seen], markers[:, seen], atol=1e-3)
+
+
+def test_records_that_together_claim_more_than_there_is(tmp_path):
+    group = bytes([5, 255]) + b"MANUF" + struct.pack("<H", 3) + b"\0"
+    text = b"".join(
+        bytes([2, 1]) + b"T%d" % k + struct.pack("<H", 8) + bytes([255, 2, 200, 20, 0, 0])
+        for k in range(3)
+    )  # each of 4,000 letters, and the next begins within them
+    content = bytes(512) + bytes([0, 0, 1, PC]) + group + text + bytes(6000)
+    content = b"\x02" + content[1:]
+    with pytest.raises(BadDataError, match="claim more bytes than there are"):
+        read_parameters(tmp_path / "a.c3d", content, PC)

@@ -10,7 +10,7 @@ were zero for 0.2 s and then filtered at 6 Hz, 275 are.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from bsip_cli.recordings.model import Finding
 
 _SKIN_M = 0.04
 _PAIR_M = 2 * _SKIN_M
-_MATES = 8  # the nearest; of the others one may be near by chance, so that it has to be so closer
+_MATES = 8  # the nearest; of all others some are as far as usual by chance
+_BY_CHANCE = 0.1  # of these: twice the shift of skin, of distances that spread over 0.8 m
 _USUALLY = 0.2, 0.5, 0.8  # of the poses: who is off the body more often has no mates
 _MOVES = 0.8  # of the markers move less than the one by which poses are chosen: two limbs may rest
 _POSES, _FRAMES = 100, 1000
@@ -120,13 +121,16 @@ class _Mates:
     ) -> np.ndarray:
         """Whether the marker is none of theirs, (n_frames,) bool, but for mates that are ``off``
         (n_frames, n_markers) the body too."""
-        change = self.change_m(positions_m)
-        far = change > _PAIR_M
-        near = change <= np.where(np.arange(len(self.columns)) < _MATES, _PAIR_M, _SKIN_M)
-        left = ~(near & ~off[:, self.columns]).any(axis=1) & (far.sum(axis=1) > 1)
-        for n in np.flatnonzero(left).tolist():
-            others = self.columns[far[n]].tolist()
-            left[n] = any(body[one].holds_to(others, positions_m[n]) for one in others)
+        first = replace(self, columns=self.columns[:_MATES], usual_m=self.usual_m[:_MATES])
+        near = first.change_m(positions_m) <= _PAIR_M
+        left = ~(near & ~off[:, first.columns]).any(axis=1)
+        left &= np.isfinite(positions_m[:, self.marker]).all(axis=1)
+        for n in np.flatnonzero(left).tolist():  # few, so that only there all mates are asked
+            change = self.change_m(positions_m[[n]])[0]
+            others = self.columns[change > _PAIR_M].tolist()
+            hold = ((change <= _SKIN_M) & ~off[n, self.columns])[_MATES:]
+            left[n] = hold.sum() <= _BY_CHANCE * len(hold) and len(others) > 1
+            left[n] &= any(body[one].holds_to(others, positions_m[n]) for one in others)
         return left
 
     def holds_to(self, others: Sequence[int], places_m: np.ndarray) -> bool:

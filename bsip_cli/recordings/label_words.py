@@ -22,7 +22,8 @@ _MOST_WORDS, _LONGEST = 7, 60  # of a label that is understood: words, character
 _SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
 _ACROSS = 0.5  # cost of a word that reaches across a separator,
 _LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
-# Of a part that stand for a word each, the side among them; less one beside longer words.
+# Of a part that stand for a word each, the side among them; less one beside longer words. More are
+# believed only where other labels have other letters at all their places but one.
 _LETTERS = 3
 _ALONE = 1.0  # cost of a side whose other side no label has
 _SPECIAL = 0.98  # of the worth of a language that extends another: it must say more
@@ -53,6 +54,8 @@ class _Reading:
     side: str
     cost: float
     side_at: tuple[int, int] = (0, 0)  # where the word of the side begins and ends
+    initials: tuple[int, ...] = ()  # places of letters that stand for a word, no side
+    is_doubtful: bool = False  # by letters that may be a word of another language
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +127,8 @@ def is_no_marker(label: str) -> bool:
     """Whether a label's words say that it is a joint centre or what else a program computed, or a
     thing."""
     ways = (_ways(split(label)[1], language) for language in _languages() if not language.telltales)
-    return any(min(one, key=lambda way: way[1])[0] is None for one in ways if one)
+    certain = ([way for way in one if not way[3]] for one in ways)
+    return any(min(one, key=lambda way: way[1])[0] is None for one in certain if one)
 
 
 def bones(labels: Sequence[str]) -> int:
@@ -149,14 +153,18 @@ def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
 def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Meaning, float]]:
     """Label to the meaning of the cheapest reading and its cost.
 
-    A body has two sides: a reading whose other side is no label of the person's costs more.
+    A body has two sides: a reading whose other side is no label of the person's costs more. Initials
+    are choices: a word of another language that is cut into letters has no label beside it in which
+    one of them is another.
     """
     spelt, found = set(map(_spelt, labels)), {}
+    with_a_gap = Counter((one[:k], one[k + 1 :]) for one in spelt for k in range(len(one)))
     for label in labels:
-        costs = [
-            (meaning, cost + _ALONE * (bool(twins) and not twins & spelt))
-            for meaning, cost, twins in _ways(label, language)
-        ]
+        text, costs = _spelt(label), []
+        for meaning, cost, twins, initials in _ways(label, language):
+            chosen = sum(with_a_gap[text[:k], text[k + 1 :]] > 1 for k in initials)
+            if not initials or chosen >= max(1, len(initials) - 1):
+                costs.append((meaning, cost + _ALONE * (bool(twins) and not twins & spelt)))
         meaning, cost = min(costs, key=lambda one: one[1], default=(None, 0.0))
         if meaning is not None:
             found[label] = meaning, cost
@@ -214,8 +222,9 @@ def _stem(label: str) -> str:
 @cache
 def _ways(
     label: str, language: _Language
-) -> tuple[tuple[Meaning | None, float, frozenset[str]], ...]:
-    """What a label may mean: meaning, cost, and how the same on the other side would be spelt."""
+) -> tuple[tuple[Meaning | None, float, frozenset[str], tuple[int, ...]], ...]:
+    """What a label may mean: meaning, cost, how the same on the other side would be spelt, and the
+    places of its initials where these are doubtful."""
     grammar, spelling = _grammar(), _Spelling(label)
     ways = []
     for reading in _cuts(spelling, 0, language, _MOST_WORDS):
@@ -226,8 +235,9 @@ def _ways(
         others = (word for word, side in language.sides.items() if reading.side not in ("", side))
         twins = frozenset(before + other + after for other in others)
         nouns_at = sum(k for k, c in enumerate(reading.concepts) if c in grammar.segments)
+        initials = reading.initials if reading.is_doubtful else ()
         for meaning, cost in _means(reading, grammar):
-            ways.append((meaning, reading.cost + _NOUN_FIRST * nouns_at + cost, twins))
+            ways.append((meaning, reading.cost + _NOUN_FIRST * nouns_at + cost, twins, initials))
     return tuple(ways)
 
 
@@ -274,9 +284,9 @@ def _cuts(
     for end, concepts, side, cost in _words_at(spelling, start, language):
         is_letter = end - start == 1
         n_letters, is_long = letters + is_letter, has_long or not (is_letter or side)
-        # Else words of other languages are understood by letters, or by one that is left over.
-        if n_letters + is_long > _LETTERS or (is_letter and has_long and nouns & {*concepts}):
-            continue
+        # Words of other languages are cut into letters, or into a word and one that is left over.
+        many = n_letters + is_long > _LETTERS
+        doubtful = many or (is_letter and has_long and bool(nouns & {*concepts}))
         for rest in _cuts(spelling, end, language, words_left - 1, n_letters, is_long):
             if not (side and rest.side):
                 yield _Reading(
@@ -284,6 +294,8 @@ def _cuts(
                     side or rest.side,
                     cost + rest.cost,
                     (start, end) if side else rest.side_at,
+                    (start, *rest.initials) if is_letter and not side else rest.initials,
+                    doubtful or rest.is_doubtful,
                 )
 
 

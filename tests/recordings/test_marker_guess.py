@@ -250,6 +250,23 @@ def test_a_word_is_not_understood_by_its_letters():
     assert meanings(["C7", *labels]).keys() == {"C7"}
 
 
+def test_initials_are_understood_where_other_labels_have_others():
+    clusters = [f"{s}{h}{a}{side}" for s in "FTB" for h in "HB" for a in "AP" for side in "GD"]
+    clusters.remove("FBPG")  # a cluster of three
+    wrists = ["PSRG", "PSUG", "PSRD", "PSUD"]
+    found = meanings([*clusters, *wrists, "EIASG", "EIASD", "Genou_G", "Genou_D", "Poignet_G"])
+    assert {label for label in clusters if label in found} == {*clusters}
+    assert {found[label].segment for label in ("FHAG", "FHPG", "FBAG")} == {"thigh_l"}
+    assert found["PSRG"].landmark == "styloid_radial_l"
+    assert found["PSUD"].landmark == "styloid_ulnar_r"
+
+
+@pytest.mark.parametrize("words", ["ruka noga glava", "haft hoft hond", "kolano stopa udo"])
+def test_words_of_other_languages_are_no_initials(words):
+    labels = [f"{word}_{side}" for word in words.split() for side in "GD"]
+    assert not {*meanings(["C7", "EIASG", "EIASD", *labels])} & {*labels}
+
+
 @pytest.mark.parametrize("sides", ["GD", "ID", "SD", "ED"])
 def test_english_words_with_the_sides_of_another_language(sides):
     left, right = sides

@@ -153,9 +153,9 @@ def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
 def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Meaning, float]]:
     """Label to the meaning of the cheapest reading and its cost.
 
-    A body has two sides: a reading whose other side is no label of the person's costs more. Initials
-    are choices: a word of another language that is cut into letters has no label beside it in which
-    one of them is another.
+    A body has two sides: a reading whose other side is no label of the person's costs more.
+    Initials are choices: a word of another language that is cut into letters has no label beside it
+    in which one of them is another.
     """
     spelt, found = set(map(_spelt, labels)), {}
     with_a_gap = Counter((one[:k], one[k + 1 :]) for one in spelt for k in range(len(one)))

@@ -33,11 +33,12 @@ def open_c3d(path: Path) -> Opened:
     content = read_content(path)
     labels, positions_m, unit_m, about_points = _read_points(content, path)
     surfaces = plate_surfaces(content.group("FORCE_PLATFORM"), unit_m)
-    up = _up(content, labels, positions_m, surfaces)
-    rotation = scene.rotation_to_z_up(up)
-    plates, about_plates, about_samples = read_plates(content, unit_m, rotation)
+    up, up_of_plates = _ups(content, labels, positions_m, surfaces)
+    rotation, of_plates = map(scene.rotation_to_z_up, (up, up_of_plates))
+    plates, about_plates, about_samples = read_plates(content, unit_m, of_plates)
     stated, about_person = stated_person(content.parameters)
-    about = (*content.findings, *about_points, *about_plates, *scene.findings_about(up))
+    about = (*content.findings, *about_points, *about_plates)
+    about += tuple(scene.findings_about(up, up_of_plates))
     about_person += _recorded_on(content.group("TRIAL"))
     recording = Recording(
         path=path,
@@ -65,25 +66,43 @@ def _recorded_on(trial: Group) -> tuple[Finding, ...]:
     return (about,) if day.year >= _FIRST_YEAR else ()
 
 
-def _up(
+def _ups(
     content: Content,
     labels: Sequence[str],
     positions_m: np.ndarray,
     surfaces: Sequence[np.ndarray],
-) -> scene.Up:
-    """From the plates and the markers above them, else the labels, else what the file says."""
-    surface = None
+) -> tuple[scene.Up, scene.Up]:
+    """Of the markers, and of the plates, which a conversion may have left in other axes.
+
+    From the plates and the markers above them, else the labels, else what the file says.
+    """
+    surface, by_labels = None, scene.up_from_labels(labels, positions_m)
     if surfaces:
         normals = np.array([np.cross(c[0] - c[1], c[0] - c[3]) for c in surfaces])
         centres = np.array([c.mean(axis=0) for c in surfaces])
         surface = scene.up_from_surface(normals, centres, positions_m)
+        of_plates = scene.Up(int(np.argmax(np.abs(normals).sum(axis=0))), 1, "the plates lie level")
+
+        def stand(up: scene.Up, up_of_plates: scene.Up) -> bool:
+            turn, of_plates = map(scene.rotation_to_z_up, (up, up_of_plates))
+            turned = [corners @ of_plates.T for corners in surfaces]
+            return scene.stands_on(labels, positions_m @ turn.T, turned)
+
+        if (
+            by_labels
+            and {by_labels.axis, of_plates.axis} == {1, 2}
+            and not (surface and stand(surface, surface))
+            and stand(by_labels, of_plates)
+        ):
+            return by_labels, of_plates
     screen = texts(content.group("POINT"), "Y_SCREEN")
-    return (
+    up = (
         surface
-        or scene.up_from_labels(labels, positions_m)
+        or by_labels
         or (scene.up_from_name(screen[0]) if screen else None)
         or scene.Up(2, 1, "nothing says otherwise")
     )
+    return up, up
 
 
 # --- the points -----------------------------------------------------------------------------------

@@ -42,6 +42,8 @@ _HIGH = ("head", "upper_torso")
 _CLEARLY_ABOVE_M = 0.2
 _CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
+_FEW_PERCENT = 2.0  # of positions may be ghosts
+_NEAR_FLOOR_M = 0.12  # markers of a foot that stands
 
 _FEW_FRAMES = 50  # by which sides are found
 _AHEAD_OF = {"legs": "pelvis", "arms": "trunk"}  # parts of `Handedness`
@@ -382,8 +384,29 @@ def rotation_to_z_up(up: Up) -> np.ndarray:
     return np.array([x, np.cross(z, x), z])
 
 
-def findings_about(up: Up) -> list[Finding]:
-    """A line for the quality table if the lab frame was not Z-up."""
+def stands_on(
+    labels: Sequence[str], markers_m: np.ndarray, surfaces_m: Sequence[np.ndarray]
+) -> bool:
+    """Whether a person of markers (n_frames, n_markers, 3) is over surfaces of corners (4, 3), both
+    Z-up: none of the body under the floor, and at times a foot on a surface."""
+    floor_m = np.median([corners[:, 2].mean() for corners in surfaces_m])
+    heights = markers_m[..., 2] - floor_m
+    if np.nanpercentile(heights, _FEW_PERCENT) < -_NEAR_FLOOR_M:
+        return False
+    by_part = by_segment(labels, markers_m)
+    feet = [by_part[name].reshape(-1, 3) for name in ("foot_l", "foot_r") if name in by_part]
+    seen = np.concatenate([np.zeros((0, 3)), *feet])
+    low = seen[np.abs(seen[:, 2] - floor_m) < _NEAR_FLOOR_M, :2]
+    edges = ((one[:, :2].min(axis=0), one[:, :2].max(axis=0)) for one in surfaces_m)
+    return any(((low > least) & (low < most)).all(axis=1).any() for least, most in edges)
+
+
+def findings_about(up: Up, of_forces: Up) -> list[Finding]:
+    """A line for the quality table if the lab frame was not Z-up, or that of the forces another."""
+    if up.axis != of_forces.axis:
+        found = f"the forces point along {of_forces.name}, and the body stands along {up.name}"
+        action, expected = "turned both axes Z-up, each in its own way", "one laboratory frame"
+        return [Finding("up_axis", "forces", found, expected, action, "corrected")]
     if up.axis == 2 and up.sign > 0:
         return []
     found, action = f"the lab's vertical is {up.name}: {up.reason}", "turned the lab frame Z-up"

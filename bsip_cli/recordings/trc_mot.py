@@ -53,7 +53,7 @@ def open_trc_mot(path: Path, written: Written = AS_WRITTEN) -> Opened:
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up, up_of_forces = _ups(trc, positions, mot)
     rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
-    findings = [*trc.findings, *findings, *_about_ups(up, up_of_forces)]
+    findings = [*trc.findings, *findings, *scene.findings_about(up, up_of_forces)]
     sources: tuple[ForceOnPoint, ...] = ()
     rate_hz, lengths, note = times.rate_hz, None, ""
     try:
@@ -139,14 +139,6 @@ def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     turned = (points * size * 1j**quarter for size in sizes for quarter in range(4))
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
     return any(np.median(distance) < BESIDE_M for distance in distances)
-
-
-def _about_ups(up: scene.Up, of_forces: scene.Up) -> list[Finding]:
-    if up.axis == of_forces.axis:
-        return scene.findings_about(up)
-    found = f"the forces point along {of_forces.name}, and the body stands along {up.name}"
-    action = "turned both files' axes Z-up, each in its own way"
-    return [Finding("up_axis", "forces", found, "one laboratory frame", action, "corrected")]
 
 
 class _NoForcesError(Exception):

@@ -281,6 +281,33 @@ def test_y_up_laboratory_is_turned(tmp_path):
     _check_wrench(recording)
 
 
+@pytest.mark.parametrize("whose", ["markers", "plates"])
+def test_plates_in_other_axes_than_the_markers_are_turned_by_themselves(tmp_path, whose):
+    markers, labels = standing_markers(N)
+    force, moment = standing_wrench(N * RATIO)
+    turn = Y_UP_FROM_Z_UP.T
+    spec = PlateSpec(force, moment, corners_m=CORNERS_M)
+    if whose == "markers":
+        markers = markers @ turn
+    else:
+        spec = PlateSpec(force @ turn, moment @ turn, corners_m=CORNERS_M @ turn)
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, labels, [spec]))
+    (about,) = [finding for finding in recording.findings if finding.check == "up_axis"]
+    assert about.expected == "one laboratory frame"
+    np.testing.assert_allclose(recording.markers_m, standing_markers(N)[0], atol=1e-6)
+    _check_wrench(recording)
+
+
+@pytest.mark.parametrize("shift_m", [0.0, 0.6, -1.2])
+def test_who_lies_on_a_plate_is_not_turned_upright(tmp_path, shift_m):
+    markers, labels = standing_markers(N)
+    lying = markers[..., [0, 2, 1]] * [1.0, 1.0, 0.4] + [0.0, shift_m, 0.0]
+    force, moment = standing_wrench(N * RATIO)
+    spec = PlateSpec(force, moment, corners_m=CORNERS_M)
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", lying, labels, [spec]))
+    np.testing.assert_allclose(recording.rotation_world_lab, np.eye(3))
+
+
 def test_x_up_without_plates_from_the_labels(tmp_path):
     markers, labels = standing_markers(N)
     recording = read_recording(write_c3d(tmp_path / "a.c3d", markers[..., [2, 0, 1]], labels))

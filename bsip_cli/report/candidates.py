@@ -40,16 +40,16 @@ class Candidate(Judged):
 
     def which_size(self, short: bool = False) -> str:
         """Of a fault of the laboratory, why its size is the one to correct with, and this person's
-        own; empty of all others. ``short``: without the interval of that."""
+        own; empty of all others. ``short``: whose it is, and without the interval of the own."""
         if not self.is_of_all:
             return ""
-        alone = ""
-        if self.own:
-            interval = "" if short else f", 95 % interval {self.own.interval()}"
-            alone = true_minus(f" (this person alone: {self.own.size()}{interval})")
-        return (
-            f"Correct with this size, as {self.persons} persons of the laboratory share it{alone}."
-        )
+        said, interval = f"Size from {self.persons} persons", ""
+        if not short:
+            said = f"Correct with this size, as {self.persons} persons of the laboratory share it"
+            interval = f", 95 % interval {self.own.interval()}" if self.own else ""
+        whose = "alone" if short else "this person alone"
+        own = f" ({whose}: {self.own.size()}{interval})" if self.own else ""
+        return true_minus(f"{said}{own}.")
 
     def in_words(self, brief: bool = False) -> str:
         """What it is with the interval of its main number, and what the markers alone say;

@@ -98,17 +98,19 @@ def use_sentence(
     first = choice.iloc[0]
     brief = (lambda method: method) if is_known else TEXTS["methods"].__getitem__
     others = [
-        f"{brief(str(method))} for {listing(list(rows['movement']))}, where OM is "
-        f"{'' if method == OM else 'not '}clearly better"
+        f"{brief(str(method))} for {listing(list(rows['movement']))}"
+        + ("" if is_known else f", where OM is {'' if method == OM else 'not '}clearly better")
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
     most = str(first["use"]) if is_known else TEXTS["methods_in_full"][str(first["use"])]
     if others:
-        most = f"{brief(str(first['use']))} for all other movements"
+        most = brief(str(first["use"]))
+        most = f"else {most}" if is_known else f"{most} for all other movements"
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
-    said = f"{use} {', and '.join([*others, most])}{compared}."
+    joined = ", " if is_known else ", and "
+    said = f"{use} {joined.join([*others, most])}{compared}."
     why = "what is wrong in the recordings gave it a body that fewer than 1 in 100 people have"
     return " ".join([said, *(f"Do not use {method}: {why}." for method in rare)])
 

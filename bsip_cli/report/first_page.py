@@ -44,8 +44,8 @@ from bsip_cli.report.words import (
 from bsip_cli.statistics.methods import OM, RM
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST_WORDS = 393  # with the title 400; the figure's few not counted
-_FINDINGS = ((2, 4), (2, 2), (2, 1), (1, 2))  # in full, and kinds that are named only
+_MOST_WORDS = 377  # with the title, the ticks of scales and the marks of lists 400
+_FINDINGS = ((2, 4), (2, 2), (2, 1), (1, 2), (1, 1))  # in full, and kinds that are named only
 _BRIEF_WORDS = 12  # of a finding that is named only; else its title
 _FEW = 3  # findings, whose actions are all given
 _MOST_TO_DO = 3
@@ -59,17 +59,18 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     light = light_for(record)
     says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
     first = (
+        *portrait(record),
         blocks.Terms((*who(record),)),
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
     )
     then = (*_sizes(record), *_sure(record, light), *_use(record))
-    room = _MOST_WORDS - blocks.words_in((*first, *then))
     for most, named in _FINDINGS:
-        causes, last = tuple(_causes(record, most, named)), tuple(_next(record, light, most))
-        if blocks.words_in((*causes, *last)) <= room:
+        causes, last = _causes(record, most, named), _next(record, light, most)
+        page = *first, *causes, *then, *last
+        if blocks.words_in(page) <= _MOST_WORDS:
             break
-    return *portrait(record), *first, *causes, *then, *last
+    return page
 
 
 def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
@@ -84,7 +85,7 @@ def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator
     yield blocks.Heading("What to do next")
     yield blocks.Bullets(tuple(said[:_MOST_TO_DO]))
     if len(said) > _MOST_TO_DO or len(_causes_shown(record, most)) < len(record.causes):
-        yield blocks.Links("", (("What to do, for all findings", f"#{verdict.ALL_FAULTS}"),))
+        yield blocks.Links("", (("Steps for all findings", f"#{verdict.ALL_FAULTS}"),))
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -95,7 +96,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     sex = f"{_SEXES[facts['sex']]}, " if facts["sex"] in _SEXES else ""
     person = f"{sex}{number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and number(plates, 1) != number(mass, 1):
-        person += f"; the plates say {number(plates, 1)} kg"
+        person += f"; plates: {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
     names = [trial.task for trial in record.trials]
     times = {name: names.count(name) for name in names}
@@ -234,7 +235,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
     used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
-    later = " (not to be used yet)" if must_wait(record) else ""
+    later = " (not yet)" if must_wait(record) else ""
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if om_waits(record):
         first, other = other, first

@@ -148,7 +148,7 @@ def test_unknown_shares_spreads_and_masses(record):
     facts["plate_mass_kg"] = facts["height_m"] = np.nan
     document = participant_document(replace(record, bsip=bsip, facts=facts))
     text = words_of(document)
-    assert "plates say" not in text
+    assert "plates:" not in text
     assert all(picture.svg for picture in pictures_of(document) if picture.name == "masses")
 
 

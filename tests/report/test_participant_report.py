@@ -125,7 +125,7 @@ def test_second_run_gives_the_same_bytes(reports):
 
 
 def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
-    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
+    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; plates: 63.1 kg), 1.63 m" in first
     assert "2 findings; no large error" in first
     assert (
         "Force plate turned or tilted: plate 1 is turned by +2.0 degrees (about the vertical: 95 % "
@@ -133,7 +133,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "the errors? ● RM, ○ OM (basketball: RM) (not to be used yet)" in first
+    assert "the errors? ● RM, ○ OM (basketball: RM) (not yet)" in first
     assert "What makes the squared error of forces (not of joint moments) with RM:" in first
     assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first

@@ -142,9 +142,8 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert f"Use after acting on the finding: {corrected}" in first
     assert (
         "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
-        "another (study.toml: roles); run again. Then use RM for basketball, where OM is not "
-        "clearly better, and OM for all other movements: in both other recordings OM's error is "
-        "34 to 46 % smaller than RM's," in first
+        "another (study.toml: roles); run again. Then use RM for basketball, else OM: in both "
+        "other recordings OM's error is 34 to 46 % smaller than RM's," in first
     )
     assert f"Files {FILE} Parameters RM (regression method): a table;" in first
     assert "OM (optimisation method): fitted to sequence" in first

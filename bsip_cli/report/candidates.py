@@ -43,7 +43,7 @@ class Candidate(Judged):
         own; empty of all others. ``short``: whose it is, and without the interval of the own."""
         if not self.is_of_all:
             return ""
-        said, interval = f"Size from {self.persons} persons", ""
+        said, interval = f"Size of {self.persons} persons together", ""
         if not short:
             said = f"Correct with this size, as {self.persons} persons of the laboratory share it"
             interval = f", 95 % interval {self.own.interval()}" if self.own else ""

@@ -179,7 +179,7 @@ def test_a_page_without_room_has_fewer_findings(record, monkeypatch):
     (numbered,) = (block for block in page if isinstance(block, Numbered))
     links, all_of_them = (block for block in page if isinstance(block, Links))
     assert len(numbered.items) == 1 and links.rest.startswith(". 2: ")
-    assert all_of_them == page[-1] and "What to do" in all_of_them.to[0][0]
+    assert all_of_them == page[-1] and "Steps" in all_of_them.to[0][0]
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):

@@ -410,10 +410,10 @@ def test_of_two_alike_in_one_recording_no_change_is_known(record):
 @pytest.mark.parametrize(
     ("own", "short", "full"),
     [
-        ({}, "share it.", "share it."),
+        ({}, ".", "share it."),
         (
             {"own_estimate": 0.006, "own_low": -0.004, "own_high": 0.016},
-            "share it (this person alone: 6 ms).",
+            " (alone: 6 ms).",
             "share it (this person alone: 6 ms, 95 % interval −4 to 16 ms).",
         ),
     ],
@@ -423,7 +423,9 @@ def test_of_two_sizes_it_is_said_with_which_to_correct(own, short, full):
     late = TURNED.assign(sentence=said, parameter="delay", unit="s", persons=7, **own)
     (cause,) = causes_of(candidates_of(late))
     correct = "Correct with this size, as 7 persons of the laboratory "
-    assert cause_line(cause, TRIALS).endswith(f"probability 99.5 %. {correct}{short}")
+    assert cause_line(cause, TRIALS).endswith(
+        f"probability 99.5 %. Size of 7 persons together{short}"
+    )
     assert cause_text(cause, TRIALS).endswith(f"{correct}{full}")
     assert "known from" not in cause_line(cause, TRIALS) + cause_text(cause, TRIALS)
 

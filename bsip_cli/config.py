@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -183,7 +183,7 @@ class Config(Section):
         """These options alone: whoever asks for another one gets an AttributeError."""
         return self.model_construct(**{name: getattr(self, name) for name in names})
 
-    def options(self, names: Iterable[str]) -> dict:
+    def options(self, names: Iterable[str]) -> dict[str, Any]:
         """The named options as plain values, as they enter an artifact's provenance."""
         everything = self.model_dump(mode="json")
         return {name: everything[name] for name in names}
@@ -201,7 +201,7 @@ def load_config(files: Iterable[Path], estimators: Sequence[str] = ()) -> Config
     return config_of(*map(read_toml, there), other, file=", ".join(sources))
 
 
-def config_of(*given: Mapping, file: str = "the options") -> Config:
+def config_of(*given: Mapping[str, Any], file: str = "the options") -> Config:
     """Defaults, then each of these in turn.
 
     UsageError: unknown options, or values out of range: all named at once, as those of ``file``.
@@ -222,7 +222,7 @@ def config_of(*given: Mapping, file: str = "the options") -> Config:
         ) from None
 
 
-def _merge(base: Mapping, over: Mapping) -> dict:
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
@@ -230,7 +230,7 @@ def _merge(base: Mapping, over: Mapping) -> dict:
     return merged
 
 
-def _fault(error: Mapping) -> str:
+def _fault(error: Mapping[str, Any]) -> str:
     path = [str(part) for part in error["loc"]]
     name = ".".join(path)
     if error["type"] == "missing":

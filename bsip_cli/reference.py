@@ -20,9 +20,10 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from bsip_cli.cli import cli
-from bsip_cli.config import Config, Section, shipped
+from bsip_cli.config import Config, Section
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
+from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.report.effect_words import EFFECT_WORDS, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Schema

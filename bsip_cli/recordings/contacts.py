@@ -294,7 +294,7 @@ def agreeing_mass(
     near = 1.0 + _MISMATCH_SHARE / 2
     above = np.searchsorted(masses, masses * near, side="right")
     count = above - np.searchsorted(masses, masses / near)
-    return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
+    return float(masses[count >= count.max() / 2].max() / np.sqrt(near))
 
 
 # --- which plate measures which foot --------------------------------------------------------------

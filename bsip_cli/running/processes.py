@@ -168,7 +168,7 @@ def work_on(
         _end(workers, tidy)
 
 
-def _start() -> _Worker:
+def _start() -> _Worker[Task]:
     ours, theirs = _SPAWN.Pipe()
     process = _SPAWN.Process(target=_serve, args=(theirs,), daemon=True)
     with endings_wait():

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -37,7 +38,7 @@ def run(unit: Unit) -> None:
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts: dict = {"light": asdict(light), "large": large_finding(record)}
+    facts: dict[str, Any] = {"light": asdict(light), "large": large_finding(record)}
     facts |= {"first": must_wait(record), "use": use_now(record)}
     unit.write("report-files", rows, facts=facts)
 
@@ -179,7 +180,7 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
-def _facts(unit: Unit, kind: str, participant: Participant) -> dict:
+def _facts(unit: Unit, kind: str, participant: Participant) -> dict[str, Any]:
     """Empty where the artifact is not there."""
     there = unit.path(kind, participant=participant).exists()
     return unit.facts(kind, participant=participant) if there else {}

@@ -94,7 +94,7 @@ class _Cohort:
             )
         yield pd.DataFrame(waiting, columns=list(Value._fields))
 
-    def facts(self) -> dict:
+    def facts(self) -> dict[str, Any]:
         """Who is missing where, and what each task's data were to OM."""
         fitted = [
             {"table": table, "task": task, "role": role, **counts}
@@ -240,7 +240,7 @@ def _of_recording(recording: Recording) -> list[Value]:
     return values
 
 
-def _of_fit(recording: Recording, method: str, fits: dict[str, dict]) -> Iterator[Value]:
+def _of_fit(recording: Recording, method: str, fits: dict[str, dict[str, Any]]) -> Iterator[Value]:
     """Errors of the centre of pressure, of forces by measure, and as vectors (root mean square);
     of a method, by component."""
     is_sequence = recording.role == "sequence"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -194,7 +195,7 @@ def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
         yield Grid(head, rows, TEXTS["captions"]["choice"], words=2)
 
 
-def _ratio(row: Mapping, name: str) -> str:
+def _ratio(row: Mapping[Any, Any], name: str) -> str:
     ratio = row[f"ratio_{name}"]
     low, high = Difference.of_ratio(ratio, row[f"log_error_{name}"]).interval()
     ends = f" ({number(low, 2)} to {number(high, 2)})" if number(low) != MISSING else ""

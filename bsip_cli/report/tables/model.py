@@ -257,7 +257,7 @@ def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ..
     )
 
 
-def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
+def fitted_on(counts: Iterable[Mapping[str, object]]) -> tuple[str, ...]:
     """For each task what its data were to OM: those it was fitted to, or data it never saw.
 
     counts : task, role, and of how many participants (``everyone``) OM was fitted to its data

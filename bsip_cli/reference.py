@@ -45,6 +45,7 @@ def pages() -> dict[str, str]:
 
 
 def write_pages(folder: Path) -> None:
+    """Into the folder, over those of before."""
     for name, text in pages().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")

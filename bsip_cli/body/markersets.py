@@ -41,6 +41,8 @@ class Marker:
 
 @dataclass(frozen=True)
 class MarkerSet:
+    """The markers that a person may wear, by the labels that files give them."""
+
     name: str
     description: str
     markers: tuple[Marker, ...]

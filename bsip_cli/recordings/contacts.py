@@ -65,6 +65,8 @@ class PlateLoad:
 
 @dataclass(frozen=True, eq=False)
 class ContactWindows:
+    """In which frames every contact is measured, and the reasons for those that are left out."""
+
     valid: np.ndarray  # (n_frames,) bool: every contact is measured
     on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
     on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured

@@ -172,6 +172,7 @@ def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, floa
 
 
 def coordinates_in(rows: pd.DataFrame) -> tuple[Coordinate, ...]:
+    """What each row is about, by its columns ``_KEY``, in the order of the rows."""
     return tuple(Coordinate(*one) for one in rows[[*_KEY]].itertuples(index=False))
 
 

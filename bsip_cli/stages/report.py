@@ -34,6 +34,7 @@ _FOUND |= {kind: kind for kind in ("detection", "choice")}
 
 
 def run(unit: Unit) -> None:
+    """Read all of one person; write the page, its figures and their numbers."""
     record = record_of(unit)
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
@@ -136,6 +137,7 @@ def origin_of(path: Path, label: str) -> records.Origin:
 
 
 def run_group(unit: Unit) -> None:
+    """Read all of the study; write the page, its figures and their numbers."""
     from bsip_cli.report.cohort.document import cohort_document  # heavy
 
     document = cohort_document(cohort_record_of(unit))

@@ -51,6 +51,7 @@ SWAY |= {"rms_ap": "mm", "rms_ml": "mm", "rms_ap_origin": "m", "rms_ml_origin": 
 
 
 def run_tests(unit: Unit) -> None:
+    """Read every trial; write the values of each participant and how methods compare."""
     cohort = _Cohort(unit)
     unit.write_in_parts("values", cohort.parts(), cohort.facts)
     unit.write("comparisons", cohort.comparisons(), cohort.facts())
@@ -278,6 +279,7 @@ def _correlations(recording: Recording) -> Iterator[tuple[Topic, tuple[float, ..
 
 
 def run_tables(unit: Unit) -> None:
+    """Read the comparisons; write each of the papers' tables in every format."""
     options, facts = unit.config.stats, unit.facts("values")
     criteria = Criteria(options.alpha, options.equivalence_percent)
     compared = unit.read("comparisons")

@@ -360,6 +360,8 @@ class BodyGroup:
 
 @dataclass(frozen=True)
 class BodyMap:
+    """Which bodies of another OpenSim model, by its name, are which of bsip's segments."""
+
     name: str
     groups: tuple[BodyGroup, ...]
 
@@ -391,6 +393,7 @@ def load_body_map(name: str) -> BodyMap:
 
 
 def shipped_names() -> tuple[str, ...]:
+    """Of the maps in configs/opensim, without ``.toml``."""
     return tuple(sorted(path.stem for path in shipped("opensim").glob("*.toml")))
 
 

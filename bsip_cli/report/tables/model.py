@@ -129,10 +129,12 @@ ABSENT = "-"
 
 
 def unit_label(unit: str) -> str:
+    """A column's unit as print has it."""
     return {"mm2": "mm²", "% body weight": "% BW"}.get(unit, unit)
 
 
 def number(decimals: int) -> Callable[[float], str]:
+    """A form with so many decimals, without a sign before zero."""
     return partial(_rounded, decimals=decimals)
 
 
@@ -147,6 +149,8 @@ def mean_sd(decimals: int) -> Callable[[float, float], str]:
 
 
 def interval(decimals: int) -> Callable[[float, float], str]:
+    """A form of both ends in brackets; absent if one is."""
+
     def form(low: float, high: float) -> str:
         ends = [_rounded(end, decimals) for end in (low, high)]
         return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
@@ -162,6 +166,7 @@ def p_value(p: float) -> str:
 
 
 def count(value: float) -> str:
+    """A whole number."""
     return ABSENT if isnan(value) else f"{value:.0f}"
 
 
@@ -224,6 +229,7 @@ def texts_of(
 
 
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:
+    """The sign if p < alpha, else nothing."""
     return sign if row.p_value < alpha else ""
 
 
@@ -277,6 +283,7 @@ def fitted_on(counts: Iterable[Mapping[str, object]]) -> tuple[str, ...]:
 
 
 def named(names: Sequence[str], comma: str = ", ") -> str:
+    """The first names, and how many more there are."""
     shown = comma.join(names[:NAMED_AT_MOST])
     more = len(names) - NAMED_AT_MOST
     return f"{shown}{comma}and {more} more" if more > 0 else shown

@@ -247,7 +247,7 @@ def field_of(section: str, name: str) -> FieldInfo:
     """The definition that checks an option."""
     model: type[Section] = Config
     if section:
-        model = Config.model_fields[section].annotation  # type: ignore[assignment]
+        model = Config.model_fields[section].annotation  # type: ignore[assignment]  # a Section
     return model.model_fields[name]
 
 

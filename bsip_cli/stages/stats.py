@@ -202,8 +202,8 @@ class Recording:
         return Value(*place, variable, method, float(value), unit)
 
 
-def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
-    return frame[frame["method"].isin(methods)].to_dict("records")  # type: ignore[return-value]
+def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[Any, Any]]:
+    return frame[frame["method"].isin(methods)].to_dict("records")
 
 
 def _of_parameters(participant: Participant, bsip: pd.DataFrame) -> tuple[list[Value], list[Value]]:

@@ -48,8 +48,8 @@ def column(
     in_row_unit: bool = False,
 ) -> Column:
     """A column of numbers: ``of`` as ``test.name``, as many as there are names of ``fields``."""
-    numbers = ((*one.split("."), *pair) for one in of.split())
-    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))  # type: ignore[arg-type]
+    numbers = ((test, name, *pair) for test, name in (one.split(".") for one in of.split()))
+    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ _SHAPE = {
 _UNFINISHED, _NOTES = ".bsip-part", ("unit", "frame", "meaning")
 
 Rows = pd.DataFrame | Sequence[Mapping[str, Any]]
+Provenance = Mapping[str, Any]
 """A table, or its rows."""
 
 
@@ -55,7 +56,7 @@ def as_read(kind: str, frame: Rows) -> pd.DataFrame:
     return _to_arrow(SCHEMAS[kind], frame).to_pandas()
 
 
-def write_artifact(path: Path, kind: str, frame: Rows, provenance: Mapping) -> None:
+def write_artifact(path: Path, kind: str, frame: Rows, provenance: Provenance) -> None:
     """Write a table under its final name only when it is whole.
 
     frame : columns as the kind's schema says; a missing or an unknown one is a bug. Or rows, of
@@ -73,7 +74,7 @@ def write_artifact(path: Path, kind: str, frame: Rows, provenance: Mapping) -> N
 
 
 def write_artifact_in_parts(
-    path: Path, kind: str, parts: Iterable[pd.DataFrame], provenance: Callable[[], Mapping]
+    path: Path, kind: str, parts: Iterable[pd.DataFrame], provenance: Callable[[], Provenance]
 ) -> None:
     """Write a table that is longer than the memory; a row group for each part.
 
@@ -99,7 +100,7 @@ def write_artifact_in_parts(
 
 def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
     words = [field.name for field in schema if field.type == pa.string()]  # numbers hardly repeat
-    options: dict = {"compression": "zstd", "write_page_checksum": True, "use_dictionary": words}
+    options = {"compression": "zstd", "write_page_checksum": True, "use_dictionary": words}
     with pq.ParquetWriter(path, schema, **options) as writer:
         for table in tables:
             writer.write_table(table.replace_schema_metadata(schema.metadata))
@@ -110,7 +111,7 @@ def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
     return map(file.read_row_group, range(file.num_row_groups))
 
 
-def write_atomically(path: Path, write) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Call ``write`` with a temporary path next to ``path``, then rename it into place.
 
     NotWritableError: the disk is full, or the place cannot be written to; what was there stays.
@@ -301,7 +302,7 @@ def _fields(schema: Schema, names: list[str]) -> list[pa.Field]:
     ]
 
 
-def _header(schema: Schema, provenance: Mapping) -> dict[str, str]:
+def _header(schema: Schema, provenance: Provenance) -> dict[str, str]:
     header = {"kind": schema.kind, "schema_version": schema.version, "provenance": provenance}
     return {"bsip": json.dumps(header, sort_keys=True)}
 

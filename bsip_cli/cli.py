@@ -84,10 +84,10 @@ def _stage_command(name: str, summary: str) -> click.Command:
     @click.command(name, help=summary)
     @_study
     @_with("--out", *_OF_STUDY, "--force", "--verify", *_VOICE, *own.get(name, ()))
-    def command(study, out, chosen, config_file, **options):
+    def command(study: Path, **asked: Any) -> int:
         from bsip_cli.running.session import run_session
 
-        return run_session(name, study, out, chosen, config_file, **options)
+        return run_session(name, study, **asked)
 
     return command
 
@@ -100,19 +100,19 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
 @cli.command()
 @_study
 @_with(*_OF_STUDY, *_VOICE)
-def check(study, chosen, config_file, jobs, **options):
+def check(**asked: Any) -> int:
     """Say what recordings are taken for, if that is a person, and what fails; nothing is kept.
 
     Exit codes: those of `bsip run`.
     """
     from bsip_cli.commands.check import check_study
 
-    return check_study(study, chosen, config_file, jobs, **options)
+    return check_study(**asked)
 
 
 @cli.command()
 @_study
-def people(study):
+def people(study: Path) -> None:
     """Print the participants of a study, one in a line, for scripts and job schedulers.
 
     Exit code 3 with nothing printed: participants.tsv cannot be read.
@@ -127,7 +127,7 @@ def people(study):
 @_study
 @_with("--preset", "--participants", "--seed", "--sequence-s", "--task", "--run")
 @_with("--plate-per-foot", "--soft-tissue", "--shoulder-girdle", *_EFFECTS)
-def simulate(study, preset, **options):
+def simulate(study: Path, preset: str, **options: Any) -> None:
     """Make a study of simulated people whose inertial parameters are known.
 
     With --effect, something is hidden in the recordings that a simulation would get wrong; the
@@ -142,21 +142,23 @@ def simulate(study, preset, **options):
 @click.argument("source", metavar="IN", type=_PATH)
 @click.argument("out", type=_PATH)
 @_with("inject --participant", "inject --seed", *_EFFECTS)
-def inject(source, out, participants, seed, **effects):
+def inject(**asked: Any) -> int:
     """Hide effects in measured recordings, where that is physically possible.
 
     IN is a study folder, a C3D file, or a TRC file with its MOT file next to it; OUT is the copy.
     """
     from bsip_cli.simulate.study import inject_command
 
-    return inject_command(source, out, participants, seed, **effects)
+    return inject_command(**asked)
 
 
 @cli.command()
 @_study
 @_with("--out", "--participant", "--method", "--format", "--model-file", "--model-bodies")
 @_with("--repair", "--what", "--to", "--config")
-def export(study, out, chosen, config_file, **asked):
+def export(
+    study: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None, **asked: Any
+) -> int:
     """Write files to go on with: people as models for Pinocchio, MuJoCo, OpenSim, biorbd and
     Visual3D (OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml, .osim, .bioMod and .csv), or with
     --what corrected recordings, motion with forces, or joint moments."""
@@ -168,7 +170,7 @@ def export(study, out, chosen, config_file, **asked):
 @cli.command()
 @click.argument("file", type=_PATH)
 @_with("--marker-set", "--prefix", "--write")
-def markers(**asked):
+def markers(**asked: Any) -> int:
     """Print a recording's labels, the marker set they fit, and what is missing on which segment.
 
     FILE is a C3D or TRC file. Where no shipped set fits, a first one is written to
@@ -186,7 +188,7 @@ def markers(**asked):
 @cli.command()
 @click.argument("given", metavar="FILES_OR_FOLDERS...", nargs=-1, required=True, type=_PATH)
 @_with("init --out", "init --participant", "--link")
-def init(**asked):
+def init(**asked: Any) -> int:
     """Make a study of recordings: C3D files, and TRC files with their MOT or STO.
 
     Files get the names that a study needs (sub-01_task-walking_run-1); static trials are recognised
@@ -205,7 +207,7 @@ def init(**asked):
 @cli.command("compare-loads")
 @_study
 @_with("--out", "compare-loads --participant", "--config", "--with", "--without")
-def compare_loads(study, out, participant, config_file, heavy, plain):
+def compare_loads(study: Path, heavy: str, plain: str, **asked: Any) -> int:
     """Find a load that is known, to see how far its mass can be trusted.
 
     Two sets of a person's recordings, with and without a load of [[loads]] in study.toml, are
@@ -215,13 +217,13 @@ def compare_loads(study, out, participant, config_file, heavy, plain):
     """
     from bsip_cli.commands.compare_loads import compare_loads as compare
 
-    return compare(study, out, participant, config_file, (heavy, plain))
+    return compare(study, names=(heavy, plain), **asked)
 
 
 @cli.command()
 @click.argument("out", type=_PATH)
 @_with("--full")
-def show(out, full):
+def show(out: Path, full: bool) -> None:
     """Print what a finished run found: the most important first, a line per finding, and where the
     reports lie."""
     from bsip_cli.commands.show import shown
@@ -233,7 +235,7 @@ def show(out, full):
 @cli.command()
 @click.argument("what", type=click.Choice(["show", "audit"]))
 @click.argument("paper", required=False)
-def published(what, paper):
+def published(what: str, paper: str | None) -> None:
     """The tables of the papers that the method comes from.
 
     `show` prints them as they are in print; `audit` recomputes intervals, t, p, d, F and sums from
@@ -248,7 +250,7 @@ def published(what, paper):
 
 @cli.command()
 @click.argument("out", type=_PATH)
-def methods(out) -> None:
+def methods(out: Path) -> None:
     """What was done with a study's data, with versions, options and references, in words to paste
     into a paper."""
     from bsip_cli.commands.methods import methods_text
@@ -258,7 +260,7 @@ def methods(out) -> None:
 
 @cli.command()
 @click.argument("artifact", required=False, type=_PATH)
-def info(artifact) -> None:
+def info(artifact: Path | None) -> None:
     """What an artifact holds and what made it; without one, the versions of bsip and of the
     libraries its numbers depend on (for bug reports)."""
     from bsip_cli.commands.info import artifact_info, versions

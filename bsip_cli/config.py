@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -17,10 +17,14 @@ _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are reported
 
 
 class Section(BaseModel):
+    """A table of options: refuses unknown ones, NaN and infinity, and is never changed."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Roles(Section):
+    """Tasks that calibrate the skeleton, the first found serves, and those that identify."""
+
     static: tuple[str, ...]
     sequence: tuple[str, ...]
 
@@ -54,6 +58,8 @@ class Load(Section):
 
 
 class Ingest(Section):
+    """Which gaps are filled, what of masses and plates is believed, what counts as complete."""
+
     max_gap_s: float = Field(ge=0)
     max_rigid_gap_s: float = Field(ge=0)
     mass_tolerance_percent: float = Field(gt=0)
@@ -71,6 +77,8 @@ class Ingest(Section):
 
 
 class Scale(Section):
+    """Which segments may be held, what is known of a geometry before the data, how it is fitted."""
+
     may_be_held: tuple[Literal["head", "upper_torso", "upper_arm", "forearm", "hand"], ...]
     joint_centre_sd_m: float = Field(gt=0)
     length_sd: float = Field(gt=0)
@@ -83,6 +91,8 @@ class Scale(Section):
 
 
 class Ik(Section):
+    """What markers are trusted to, and when a joint angle is not determined."""
+
     marker_sd_m: float = Field(gt=0)
     robust_limit_m: float = Field(gt=0)
     posture_sd_rad: float = Field(gt=0)
@@ -92,6 +102,8 @@ class Ik(Section):
 
 
 class Smoothing(Section):
+    """How poses become velocities and accelerations, and what skin motion adds to the noise."""
+
     method: Literal["spline", "butterworth"]
     butterworth_cutoff_hz: float = Field(gt=0)
     pace_window_s: float = Field(gt=0)
@@ -101,10 +113,14 @@ class Smoothing(Section):
 
 
 class Regress(Section):
+    """The anthropometric table of RM."""
+
     table: Literal["dumas2007", "dumas2015"]
 
 
 class Prior(Section):
+    """How far people differ from the table."""
+
     com_sd_percent: float = Field(gt=0)
     midline_sd_m: float = Field(gt=0)
     origin_sd_m: float = Field(ge=0)
@@ -113,6 +129,8 @@ class Prior(Section):
 
 
 class Identify(Section):
+    """Estimators, the first of which is OM, and how the data are filtered, held out and weighed."""
+
     estimators: tuple[Literal["consistent", "hansen2017", "robert2017", "base"], ...] = Field(
         min_length=1
     )
@@ -127,16 +145,22 @@ class Identify(Section):
 
 
 class Reconstruct(Section):
+    """Cut-off of both wrenches, and the least force with a centre of pressure."""
+
     cutoff_hz: float = Field(gt=0)
     cop_min_force_percent_bw: float = Field(gt=0, lt=100)
 
 
 class Joints(Section):
+    """Cut-off of joint forces and moments, and how well joint centres are known."""
+
     cutoff_hz: float = Field(gt=0)
     centre_sd_m: float = Field(gt=0)
 
 
 class Diagnosis(Section):
+    """When an error is large, how likely faults are before the data, and when one is named."""
+
     cutoff_hz: float = Field(gt=0)
     skin_factor: float = Field(ge=0)
     landmark_sd_m: float = Field(gt=0)
@@ -149,12 +173,16 @@ class Diagnosis(Section):
 
 
 class Laboratory(Section):
+    """How persons may differ from their laboratory, and when each was recorded."""
+
     between_persons: float = Field(gt=0)
     alike: float = Field(ge=0, lt=1)
     recorded_on: dict[str, str]
 
 
 class Stats(Section):
+    """Level of the tests, and below which difference two methods are equivalent."""
+
     alpha: float = Field(gt=0, lt=1)
     equivalence_percent: float = Field(gt=0)
 
@@ -183,7 +211,7 @@ class Config(Section):
         """These options alone: whoever asks for another one gets an AttributeError."""
         return self.model_construct(**{name: getattr(self, name) for name in names})
 
-    def options(self, names: Iterable[str]) -> dict:
+    def options(self, names: Iterable[str]) -> dict[str, Any]:
         """The named options as plain values, as they enter an artifact's provenance."""
         everything = self.model_dump(mode="json")
         return {name: everything[name] for name in names}
@@ -201,7 +229,7 @@ def load_config(files: Iterable[Path], estimators: Sequence[str] = ()) -> Config
     return config_of(*map(read_toml, there), other, file=", ".join(sources))
 
 
-def config_of(*given: Mapping, file: str = "the options") -> Config:
+def config_of(*given: Mapping[str, Any], file: str = "the options") -> Config:
     """Defaults, then each of these in turn.
 
     UsageError: unknown options, or values out of range: all named at once, as those of ``file``.
@@ -222,7 +250,7 @@ def config_of(*given: Mapping, file: str = "the options") -> Config:
         ) from None
 
 
-def _merge(base: Mapping, over: Mapping) -> dict:
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)
@@ -230,7 +258,7 @@ def _merge(base: Mapping, over: Mapping) -> dict:
     return merged
 
 
-def _fault(error: Mapping) -> str:
+def _fault(error: Mapping[str, Any]) -> str:
     path = [str(part) for part in error["loc"]]
     name = ".".join(path)
     if error["type"] == "missing":

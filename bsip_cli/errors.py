@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection
 from functools import partial
+from typing import Any
 
 
 def printable(text: str) -> str:
@@ -50,7 +51,7 @@ class BsipError(Exception):
         remedy = f". To correct it: {self.remedy}" if self.remedy else ""
         return printable(f"{where}{self.found}{expected}{remedy}.")
 
-    def __reduce__(self):  # crosses process borders with its data
+    def __reduce__(self) -> tuple[Any, ...]:  # crosses process borders with its data
         known = {"expected": self.expected, "remedy": self.remedy, "file": self.file}
         return partial(type(self), **known), (self.found,)
 

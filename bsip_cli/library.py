@@ -285,7 +285,7 @@ class _Kept:
     """A table, what its stage said of it, and how many rows were its stage's own."""
 
     frame: pd.DataFrame
-    facts: dict
+    facts: dict[str, Any]
     rows_made: int
 
 
@@ -312,10 +312,10 @@ class _InMemory(Unit):
 
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
-    ) -> dict:
+    ) -> dict[str, Any]:
         return self.kept[self.path(kind, trial, participant)].facts
 
-    def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
+    def write(self, kind: str, frame: Rows, facts: dict[str, Any] | None = None) -> None:
         plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
         self.kept[self.path(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
 

@@ -79,8 +79,8 @@ def _stage(
     module, function = does.split()
     lists: Any = {key: tuple(x.replace("@scene", scene).split()) for key, x in kinds.items()}
     lists |= {"part": part, "reads_recordings": reads_recordings, "costs_s": costs_s}
-    lists |= {"module": "bsip_cli.stages." + module, "function": function}
-    return Stage(name, level, summaries[name], **lists)  # type: ignore[arg-type]
+    lists |= {"level": level, "module": "bsip_cli.stages." + module, "function": function}
+    return Stage(name, summary=summaries[name], **lists)
 
 
 STAGES = _read()

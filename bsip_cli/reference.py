@@ -20,9 +20,10 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from bsip_cli.cli import cli
-from bsip_cli.config import Config, Section, shipped
+from bsip_cli.config import Config, Section
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
+from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.report.effect_words import EFFECT_WORDS, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Schema
@@ -44,6 +45,7 @@ def pages() -> dict[str, str]:
 
 
 def write_pages(folder: Path) -> None:
+    """Into the folder, over those of before."""
     for name, text in pages().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
@@ -245,7 +247,7 @@ def field_of(section: str, name: str) -> FieldInfo:
     """The definition that checks an option."""
     model: type[Section] = Config
     if section:
-        model = Config.model_fields[section].annotation  # type: ignore[assignment]
+        model = Config.model_fields[section].annotation  # type: ignore[assignment]  # a Section
     return model.model_fields[name]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from bsip_cli.files.regular import read_toml, shipped
 
@@ -62,8 +62,9 @@ def _columns(text: str, groups: dict[str, str]) -> tuple[Column, ...]:
         if line.startswith("@"):
             found += _columns(groups[line[1:]], groups)
         elif parts := _LINE.fullmatch(line):
-            names, kind, unit, frame, meaning = parts.groups(default="")
-            found += [Column(name, kind, unit, meaning, frame) for name in names.split()]  # type: ignore[arg-type]
+            said: dict[str, Any] = parts.groupdict(default="")
+            names = said.pop("names").split()
+            found += [Column(name, **said) for name in names]
         else:
             raise ValueError(f"no column: {line}")
     return tuple(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -135,7 +135,9 @@ def readings_of(
     return _within(quantity, likely, False)
 
 
-def _within(quantity: Quantity, values, is_stated: bool) -> tuple[Reading, ...]:
+def _within(
+    quantity: Quantity, values: Iterable[tuple[float, str]], is_stated: bool
+) -> tuple[Reading, ...]:
     near = ((round(value, _DIGITS), unit) for value, unit in values if quantity.holds(value))
     return tuple(Reading(value, unit, is_stated) for value, unit in near)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -197,12 +198,14 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
     )
 
 
-def _sd(spreads: Sequence[Mapping], row: str, name: str) -> float:
+def _sd(spreads: Sequence[Mapping[str, Any]], row: str, name: str) -> float:
     """Of people, and of tables where they were compared; the mean variance of the sexes."""
     return float(np.sqrt(np.mean([np.sum(np.square(one[row][name])) for one in spreads])))
 
 
-def _differs(figures: Mapping, is_small: bool, mass_kg: float, stature_m: float, row: str) -> float:
+def _differs(
+    figures: Mapping[str, Any], is_small: bool, mass_kg: float, stature_m: float, row: str
+) -> float:
     """By how much [%] a segment's share of the body's mass differs: a boy's from a man's, else from
     that of people of the same stature and the mean body-mass index."""
     if is_small:

@@ -7,10 +7,10 @@ from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
+from typing import Any
 
-from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError, did_you_mean
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 from bsip_cli.segments import JOINT_CENTRES, LANDMARKS, SEGMENTS
 
 _TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
@@ -41,6 +41,8 @@ class Marker:
 
 @dataclass(frozen=True)
 class MarkerSet:
+    """The markers that a person may wear, by the labels that files give them."""
+
     name: str
     description: str
     markers: tuple[Marker, ...]
@@ -57,12 +59,12 @@ class MarkerSet:
         """The labels on a segment, as a list in words."""
         return ", ".join(marker.label for marker in self.markers if marker.segment == segment)
 
-    def as_data(self) -> dict:
+    def as_data(self) -> dict[str, Any]:
         """As JSON can hold it: what :meth:`from_data` reads."""
         return asdict(self)
 
     @staticmethod
-    def from_data(data: dict) -> MarkerSet:
+    def from_data(data: dict[str, Any]) -> MarkerSet:
         """The set that was written as data."""
         rows = [row | {"aliases": tuple(row["aliases"])} for row in data["markers"]]
         markers = tuple(Marker(**row) for row in rows)
@@ -103,7 +105,7 @@ def shipped_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in shipped("markersets").glob("*.toml")))
 
 
-def _faults(data: dict) -> list[str]:
+def _faults(data: dict[str, Any]) -> list[str]:
     segments = data.get("segments")
     if not isinstance(segments, dict) or not segments:
         return ['no [segments]: expected lines like head = { RTEM = "temple_r" }']
@@ -129,7 +131,7 @@ def _faults(data: dict) -> list[str]:
     return faults + _option_faults(data, labels)
 
 
-def _option_faults(data: dict, labels: list[str]) -> list[str]:
+def _option_faults(data: dict[str, Any], labels: list[str]) -> list[str]:
     weights, aliases = data.get("weights", {}), data.get("aliases", {})
     optional = data.get("optional", {})
     if not _are_words(data.get("also_called", [])):

@@ -10,9 +10,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Literal
 
-from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 from bsip_cli.segments import LANDMARKS, LINKS, SEGMENTS, joint_of
 
 JointType = Literal["free", "spherical", "revolute"]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -42,6 +43,7 @@ _READER = Stage(
 )
 _OPTIONS = ("--with", "--without")
 _TEXTS = TEXTS["compare_loads"]
+_Line = tuple[str | float, ...]
 TWO, LOADED, ALL = "two identifications", "loaded segments", "all"
 
 
@@ -156,7 +158,7 @@ def _check_set(unit: Unit, option: str, trials: list[Trial], ready: Sequence[Tri
         )
 
 
-def _carried(unit: Unit, trial: Trial) -> list[dict]:
+def _carried(unit: Unit, trial: Trial) -> list[dict[str, object]]:
     return sorted(loads_record(unit, trial), key=str)
 
 
@@ -189,7 +191,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
     )
 
 
-def _row(values: dict) -> Row:
+def _row(values: Mapping[Any, Any]) -> Row:
     unit, segment = values["unit"], values["segment"]
     factor, digits, unit = (1000.0, 0, "mm") if unit == "m" else (1.0, 3, unit)
     numbers = ("difference", "ci_low", "ci_high", "declared", "expected")
@@ -247,7 +249,7 @@ def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence
         names = [skeleton.segments[i] for i in loaded]
         rows += [*both.rows(names), *both.centres(names, person.origin_in_joint_m[loaded])]
     stems = ([trial.stem for trial in trials] for trials in sets)
-    facts: dict = dict(zip(("with", "without"), stems, strict=True)) | {"estimator": estimator}
+    facts = {**dict(zip(("with", "without"), stems, strict=True)), "estimator": estimator}
     table = pd.DataFrame(rows, columns=column_names("load-comparison"))
     unit.write("load-comparison", table, facts)
 
@@ -284,23 +286,23 @@ class _Block:
 
     def _row(
         self, of: tuple[str, str, str], value: float, variance: float, declared: float, other: float
-    ) -> tuple:
+    ) -> _Line:
         half = _Z95 * np.sqrt(variance)
         return self.analysis, *of, value, value - half, value + half, declared, other
 
-    def rows(self, segments: Sequence[str]) -> Iterator[tuple]:
+    def rows(self, segments: Sequence[str]) -> Iterator[_Line]:
         """Ten of each segment."""
         numbers = (self.phi, np.diag(self.covariance), self.declared, self.expected)
         for k, known in enumerate(zip(*numbers, strict=True)):
             yield self._row((segments[k // 10], PARAMETERS[k % 10], UNITS[k % 10]), *known)
 
-    def total(self) -> tuple:
+    def total(self) -> _Line:
         """The masses' sum."""
         known = float(self.declared[::10].sum()), float(self.expected[::10].sum())
         spread = self.covariance[::10, ::10].sum()
         return self._row((ALL, "m", "kg"), float(self.phi[::10].sum()), spread, *known)
 
-    def centres(self, segments: Sequence[str], origins_m: np.ndarray) -> Iterator[tuple]:
+    def centres(self, segments: Sequence[str], origins_m: np.ndarray) -> Iterator[_Line]:
         """Three of each segment; none of one whose mass may be zero (95 %), which has no centre."""
         for k, segment in enumerate(segments):
             own = slice(10 * k, 10 * k + 10)

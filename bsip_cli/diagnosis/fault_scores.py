@@ -15,7 +15,7 @@ from scipy.special import logit, logsumexp
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.error_model import Session, TrialErrors
-from bsip_cli.diagnosis.fault_model import SIZES, Fitted
+from bsip_cli.diagnosis.fault_model import SIZES, Fitted, Piece
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.scene import Scene
@@ -43,6 +43,9 @@ class Candidate(NamedTuple):
         values = np.zeros(len(free))
         values[~free] = self.scanned
         return values
+
+
+_Products = tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]
 
 
 class Kind(NamedTuple):
@@ -100,9 +103,7 @@ class Library:
         """Logarithm of the prior odds of a kind, whatever the values of a scan."""
         return float(logsumexp(self.log_prior[self.kinds.get(kind, [])]))
 
-    def products(
-        self, fit: Fitted, trial: int
-    ) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
+    def products(self, fit: Fitted, trial: int) -> _Products:
         """Of the white signatures of a trial with its residual (C,), with the columns of all terms
         (K', C), and each candidate's with itself (k, k); once for the same noise and faults."""
         piece = fit.pieces[trial]
@@ -113,7 +114,7 @@ class Library:
         return self._products[piece]
 
     @cached_property
-    def _products(self) -> WeakKeyDictionary:
+    def _products(self) -> WeakKeyDictionary[Piece, _Products]:
         return WeakKeyDictionary()
 
 

@@ -95,7 +95,7 @@ def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()
     for verdict in verdicts:
         unsure = [] if verdict in sure else [(x.fault, p) for x, p in verdict.members]
         hardly += [*unsure, *verdict.others]
-    best: dict[tuple, tuple[Hypothesis, float]] = {}
+    best: dict[tuple[object, ...], tuple[Hypothesis, float]] = {}
     for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
         place = (*one.key, one.trials)
         if place not in said:

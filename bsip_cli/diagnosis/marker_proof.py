@@ -268,7 +268,7 @@ def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.n
 
 
 def _is_throughout(scene: Scene, from_s: float) -> bool:
-    return from_s < scene.times_s[0]
+    return bool(from_s < scene.times_s[0])
 
 
 def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:

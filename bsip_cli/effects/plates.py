@@ -38,6 +38,7 @@ def unit_of(channel: str) -> str:
 
 
 def plate_of(scene: Scene, name: str) -> Plate:
+    """The plate of this name, which the scene must have."""
     return next(plate for plate in scene.plates if plate.name == name)
 
 

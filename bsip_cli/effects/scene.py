@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 FINER = 4  # samples per frame of the wrench between frames
+Made = TypeVar("Made")
 SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out
 TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
@@ -227,7 +228,7 @@ class Scene:
     def _kept(self) -> dict[Hashable, Any]:
         return {}
 
-    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
         """What ``make`` returns, computed when it is first asked for under this key."""
         if key not in self._kept:
             self._kept[key] = make()

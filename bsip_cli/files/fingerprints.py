@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from bsip_cli.errors import BadDataError
 
@@ -181,7 +182,7 @@ def _taken(name: str) -> Fingerprint:
         return Fingerprint(plain.hexdigest(), sealed.hexdigest().encode() == place[1])
 
 
-def _footer(file) -> tuple[int, bytes]:
+def _footer(file: BinaryIO) -> tuple[int, bytes]:
     """Where the footer of a Parquet file begins, and its bytes; of another file its end."""
     size = file.seek(0, os.SEEK_END)
     file.seek(max(0, size - 8))
@@ -192,7 +193,7 @@ def _footer(file) -> tuple[int, bytes]:
     return at, file.read()
 
 
-def _digest(file, until: int):
+def _digest(file: BinaryIO, until: int) -> hashlib._Hash:
     digest = hashlib.sha256()
     file.seek(0)
     while until > 0:

@@ -12,6 +12,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 
@@ -58,7 +59,7 @@ def check_regular(path: Path, error: type[BsipError] = BadDataError) -> None:
         )
 
 
-def read_toml(file: Path) -> dict:
+def read_toml(file: Path) -> dict[str, Any]:
     """The content of a TOML file.
 
     UsageError: it cannot be read, or is not TOML.

@@ -158,7 +158,7 @@ def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
     return Optimum(x, value, 0.5 * (inverse + inverse.T), steps)
 
 
-def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple]:
+def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, bool]]:
     """Scale (n,) and Cholesky factor of the matrix scaled to a unit diagonal.
 
     Next to a segment that the data press flat, rounding may hide the rest: then a little is added

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from bsip_cli.body.person import Person
-from bsip_cli.config import shipped
 from bsip_cli.dynamics.ground_wrench import wrench_regressor
+from bsip_cli.files.regular import shipped
 from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import Beforehand, beforehand
 

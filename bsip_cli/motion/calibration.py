@@ -16,6 +16,7 @@ from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.segments import in_words
 
+Places = Mapping[str, np.ndarray]  # label or landmark to its position [m]
 Frame = tuple[np.ndarray, np.ndarray]  # origin (3,) and axes (3, 3) with X, Y, Z as columns
 
 
@@ -33,10 +34,10 @@ class Calibration:
 def calibrate(
     skeleton: Skeleton,
     marker_set: MarkerSet,
-    positions: Mapping[str, np.ndarray],
+    positions: Places,
     sex: str,
     height_m: float | None,
-    trials: Sequence[Mapping[str, np.ndarray]] = (),
+    trials: Sequence[Places] = (),
 ) -> Calibration:
     """Build the skeleton from marker positions in one standing pose.
 
@@ -63,7 +64,8 @@ def calibrate(
         lengths[row] = float(np.mean([_joint_to_joint(centres, row, side) for side in "lr"]))
     stature = height_m or stature_m(sex, lengths)
     frames = _frames(skeleton, centres, landmarks)
-    person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
+    lengths_m = _table_lengths(skeleton, centres, frames, sex, stature, landmarks)
+    person = _person(skeleton, marker_set, positions, centres, frames, lengths_m)
     forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
     return Calibration(
         person, _pose(person, frames), unit(forward), stature, (*placed, *notes, *centres.notes)
@@ -74,7 +76,7 @@ def calibrate(
 _HEIGHTS = (("c7", 0.84), ("acromion_l", 0.82), ("asis_l", 0.54))
 
 
-def _rough_stature(landmarks: Mapping[str, np.ndarray]) -> float:
+def _rough_stature(landmarks: Places) -> float:
     """Stature from the height of the highest known landmark over the heel; upright standing."""
     for name, part in _HEIGHTS:
         if name in landmarks and "calcaneus_l" in landmarks:
@@ -86,9 +88,7 @@ def _rough_stature(landmarks: Mapping[str, np.ndarray]) -> float:
     )
 
 
-def _frames(
-    skeleton: Skeleton, centres: JointCentres, landmarks: Mapping[str, np.ndarray]
-) -> dict[str, Frame]:
+def _frames(skeleton: Skeleton, centres: JointCentres, landmarks: Places) -> dict[str, Frame]:
     """Origin and axes of every segment in the standing pose (ISB, as in Dumas 2007)."""
     p = centres.positions
     up = p["neck"] - p["waist"]
@@ -141,7 +141,14 @@ def _y_first(y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks) -> Person:
+def _person(
+    skeleton: Skeleton,
+    marker_set: MarkerSet,
+    positions: Places,
+    centres: JointCentres,
+    frames: Mapping[str, Frame],
+    lengths_m: np.ndarray,
+) -> Person:
     joints = dict(centres.positions) | {"root": centres.positions["waist"]}
     placed = [
         (*frames[name], joints[joint])
@@ -169,7 +176,7 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
         tilts[0],
         tilts[1],
         origin,
-        _table_lengths(skeleton, centres, frames, sex, stature, landmarks),
+        lengths_m,
         tuple(m.label for m in present),
         np.array([skeleton.index(name) for name in on]),
         np.array(local),
@@ -193,7 +200,14 @@ def _joint_to_joint(centres: JointCentres, row: str, side: str) -> float:
     return float(np.linalg.norm(end - start))
 
 
-def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.ndarray:
+def _table_lengths(
+    skeleton: Skeleton,
+    centres: JointCentres,
+    frames: Mapping[str, Frame],
+    sex: str,
+    stature: float,
+    landmarks: Places,
+) -> np.ndarray:
     """(n,) lengths as the anthropometric table defines them; of a clavicle, joint to joint."""
     p, lengths = centres.positions, np.empty(len(skeleton.segments))
     for i, (name, row) in enumerate(zip(skeleton.segments, skeleton.table_rows, strict=True)):
@@ -315,9 +329,9 @@ _HALF_M = 0.04  # of the distance of the epicondyles put in; only their middle a
 
 def functional_landmarks(
     marker_set: MarkerSet,
-    landmarks: Mapping[str, np.ndarray],
-    reference: Mapping[str, np.ndarray],
-    trials: Sequence[Mapping[str, np.ndarray]],
+    landmarks: Places,
+    reference: Places,
+    trials: Sequence[Places],
     sex: str,
 ) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     """Epicondyles and malleoli (3,) [m] in the reference pose of the sides that have neither, where
@@ -365,8 +379,8 @@ def functional_landmarks(
 def _joint(
     kind: str,
     segments: Sequence[Sequence[Marker]],
-    reference: Mapping[str, np.ndarray],
-    trials: Sequence[Mapping[str, np.ndarray]],
+    reference: Places,
+    trials: Sequence[Places],
 ) -> FunctionalJoint | None:
     """The joint between two segments with these markers; None where markers or movement do not
     show it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -121,7 +122,7 @@ def solve_poses(
     return Poses(q, residual, sd, steps >= 0)
 
 
-def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
+def solve_trial(person: Person, markers_m: np.ndarray, **options: Any) -> Poses:
     """Poses of a whole trial (N, m, 3), from the frame that shows most markers to both ends.
 
     ``options`` and errors as in :func:`solve_poses`.
@@ -140,7 +141,7 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
     return Poses(*(np.concatenate([one[::-1], other]) for one, other in both))
 
 
-def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
+def first_pose(person: Person, markers_m: np.ndarray, **options: Any) -> np.ndarray:
     """(nq,) pose of one frame (m, 3) without a neighbour to start from.
 
     The best of several starts: the neutral pose and random turns of all joints about it, since

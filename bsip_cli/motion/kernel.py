@@ -14,6 +14,7 @@ import numpy as np
 from bsip_cli.motion.compiled import compiled
 
 FREE, SPHERICAL, REVOLUTE = 0, 1, 2
+Array = np.ndarray
 
 # The skeleton: per segment its joint's kind, parent, first entry in q and v, place and turn in the
 # parent and hinge axis; per velocity its segment and the velocity before it on the way to the base.
@@ -26,14 +27,14 @@ Task = namedtuple("Task", "segments positions weights limit prior")
 
 
 @compiled
-def _cross(a, b, out):
+def _cross(a: Array, b: Array, out: Array) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
-def _rotation_of_quaternion(q, out):
+def _rotation_of_quaternion(q: Array, out: Array) -> None:
     x, y, z, w = q[0], q[1], q[2], q[3]
     out[0, 0] = 1 - 2 * (y * y + z * z)
     out[0, 1] = 2 * (x * y - z * w)
@@ -47,7 +48,7 @@ def _rotation_of_quaternion(q, out):
 
 
 @compiled
-def _turn_quaternion(q, omega):
+def _turn_quaternion(q: Array, omega: Array) -> None:
     """q <- q * exp(omega), omega in the body's own axes."""
     angle = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
     k = 0.5 if angle < 1e-12 else np.sin(0.5 * angle) / angle
@@ -64,7 +65,7 @@ def _turn_quaternion(q, omega):
 
 
 @compiled
-def _hinge_rotation(u, angle, out):
+def _hinge_rotation(u: Array, angle: float, out: Array) -> None:
     """Rotation by an angle about a unit axis (Rodrigues)."""
     c, s = np.cos(angle), np.sin(angle)
     for j in range(3):
@@ -80,7 +81,7 @@ def _hinge_rotation(u, angle, out):
 
 
 @compiled
-def forward(q, tree, R, p):
+def forward(q: Array, tree: Tree, R: Array, p: Array) -> None:
     """Fill R (n, 3, 3) and p (n, 3): orientation of each segment and its joint centre, world."""
     local = np.empty((3, 3))
     for i in range(tree.kinds.size):
@@ -107,7 +108,7 @@ def forward(q, tree, R, p):
 
 
 @compiled
-def _angles(q, tree):
+def _angles(q: Array, tree: Tree) -> Array:
     """(nv,) joint angles, which the prior pulls to zero; of the base, zeros. Of a unit quaternion
     the rotation vector, by the shorter way."""
     angles = np.zeros(tree.v_segments.size)
@@ -125,7 +126,9 @@ def _angles(q, tree):
 
 
 @compiled
-def _evaluate(q, tree, task, measured, R, p, residuals):
+def _evaluate(
+    q: Array, tree: Tree, task: Task, measured: Array, R: Array, p: Array, residuals: Array
+) -> float:
     """Pose the model; fill R, p and the residuals (m, 3): measured less model, NaN where missing.
 
     Returns the cost: half the weighted squares, growing like the logarithm beyond the limit, plus
@@ -152,7 +155,7 @@ def _evaluate(q, tree, task, measured, R, p, residuals):
 
 
 @compiled
-def _columns(R, p, tree, d, w):
+def _columns(R: Array, p: Array, tree: Tree, d: Array, w: Array) -> None:
     """Velocity d + w x r that each unit velocity gives a point r (from the base's origin)."""
     r = np.empty(3)
     for i in range(tree.kinds.size):
@@ -176,7 +179,9 @@ def _columns(R, p, tree, d, w):
 
 
 @compiled
-def _gather(residuals, measured, base, tree, task, sums):
+def _gather(
+    residuals: Array, measured: Array, base: Array, tree: Tree, task: Task, sums: Array
+) -> None:
     """Fill sums (n, 4, 10) over the markers on each segment and beyond: weighted products of (x, 1)
     and (x, 1, r, x x r) of places x from the base's origin and residuals r."""
     sums[:] = 0.0
@@ -199,7 +204,9 @@ def _gather(residuals, measured, base, tree, task, sums):
 
 
 @compiled
-def _assemble(d, w, sums, q, tree, task, H, g):
+def _assemble(
+    d: Array, w: Array, sums: Array, q: Array, tree: Tree, task: Task, H: Array, g: Array
+) -> None:
     """H (nv, nv; only between a velocity and its ancestors) and descent direction g of the markers
     and of the prior, which pulls the joint angles to zero."""
     F, T = np.empty(3), np.empty(3)
@@ -229,7 +236,7 @@ def _assemble(d, w, sums, q, tree, task, H, g):
 
 
 @compiled
-def _bend(d, w, sums, tree, N, H):
+def _bend(d: Array, w: Array, sums: Array, tree: Tree, N: Array, H: Array) -> None:
     """Add to H what the curvature of the markers' paths makes of the residuals (Newton's term).
 
     A marker at x moves by d_k + w_k x x when velocity k does, and an ancestor's rotation w_a turns
@@ -259,7 +266,7 @@ def _bend(d, w, sums, tree, N, H):
 
 
 @compiled
-def _factor(H, damping, v_parents, L):
+def _factor(H: Array, damping: float, v_parents: Array, L: Array) -> bool:
     """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
 
     Returns whether the matrix is positive definite.
@@ -286,7 +293,7 @@ def _factor(H, damping, v_parents, L):
 
 
 @compiled
-def _solve(L, v_parents, x):
+def _solve(L: Array, v_parents: Array, x: Array) -> None:
     """x <- (L^T L)^-1 x."""
     nv = v_parents.size
     for i in range(nv - 1, -1, -1):
@@ -304,7 +311,7 @@ def _solve(L, v_parents, x):
 
 
 @compiled
-def _step(q, dv, tree, R0, out):
+def _step(q: Array, dv: Array, tree: Tree, R0: Array, out: Array) -> None:
     """out = q moved by dv (base: translation and rotation in its own axes)."""
     out[:] = q
     for i in range(tree.kinds.size):
@@ -321,7 +328,9 @@ def _step(q, dv, tree, R0, out):
 
 
 @compiled
-def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
+def _solve_frame(
+    q: Array, measured: Array, tree: Tree, task: Task, max_steps: int, residuals: Array, L: Array
+) -> int:
     """Move q to the least-squares pose of one frame; return the steps, or -1 if they ran out.
 
     Fills the residuals (m, 3) at the pose and L, the factor of the Gauss-Newton matrix there.
@@ -373,7 +382,17 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
 
 
 @compiled
-def solve_frames(markers, starts, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
+def solve_frames(
+    markers: Array,
+    starts: Array,
+    tree: Tree,
+    task: Task,
+    max_steps: int,
+    q_out: Array,
+    residual_out: Array,
+    sd_out: Array,
+    steps_out: Array,
+) -> None:
     """Least-squares pose of every frame, from its start where it has one, else from the last frame
     that shows a marker: without one the prior leads to the neutral pose, from which others may end
     in a wrong optimum.
@@ -399,14 +418,16 @@ def solve_frames(markers, starts, tree, task, max_steps, q_out, residual_out, sd
 
 
 @compiled
-def forward_frames(q, tree, R, p):
+def forward_frames(q: Array, tree: Tree, R: Array, p: Array) -> None:
     """Fill R (N, n, 3, 3) and p (N, n, 3) for q (N, nq)."""
     for frame in range(q.shape[0]):
         forward(q[frame], tree, R[frame], p[frame])
 
 
 @compiled
-def marker_columns(R, p, markers, tree, below, columns):
+def marker_columns(
+    R: Array, p: Array, markers: Array, tree: Tree, below: Array, columns: Array
+) -> None:
     """Fill columns (N, m, 3, nv) with the velocity of each marker (N, m, 3) for each unit velocity
     where it hangs on that joint: below (n, m)."""
     nv = tree.v_segments.size

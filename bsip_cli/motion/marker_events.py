@@ -293,7 +293,7 @@ def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
 
     Swaps first, then offsets, slips and jumps, the largest first.
     """
-    groups: dict[tuple, list[MarkerEvent]] = {}
+    groups: dict[tuple[object, ...], list[MarkerEvent]] = {}
     for one in events:
         same = (one.start_s, one.end_s, one.put_right)
         key = same if one.kind == "swap" else (one.marker,)

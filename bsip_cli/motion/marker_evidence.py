@@ -34,6 +34,7 @@ from scipy.ndimage import median_filter
 
 from bsip_cli.motion.marker_events import (
     BEYOND,
+    Kind,
     LevelChange,
     MarkerEvent,
     event,
@@ -281,9 +282,9 @@ def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
         size = float(np.linalg.norm(slip.vector))
         sums = ((k, one.m, slip.vector + one.vector) for k, one in enumerate(waiting))
         back = [k for k, m, sum_ in sums if m == slip.m and np.linalg.norm(sum_) < 0.5 * size]
-        kind, stop = ("jump", waiting.pop(back[0]).frame) if back else ("slip", len(fit.times_s))
-        frames = slice(slip.frame, stop)
-        events.append(event(fit, kind, slip.m, frames, size, slip.z))  # type: ignore[arg-type]
+        kind: Kind = "jump" if back else "slip"
+        frames = slice(slip.frame, waiting.pop(back[0]).frame if back else len(fit.times_s))
+        events.append(event(fit, kind, slip.m, frames, size, slip.z))
     return events
 
 

@@ -6,8 +6,9 @@ poses are eliminated frame by frame (variable projection), the geometry takes Ga
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from bsip_cli.motion.inverse_kinematics import (
 )
 from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
+
+IkOptions = Mapping[str, Any]  # keyword options of :func:`solve_poses`
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ class _Parameter:
 
 
 def refine(
-    person: Person, markers_m: np.ndarray, q: np.ndarray, options: ScalingOptions, ik: dict
+    person: Person, markers_m: np.ndarray, q: np.ndarray, options: ScalingOptions, ik: IkOptions
 ) -> Refinement:
     """Fit the person's geometry to N frames chosen from all trials.
 
@@ -126,7 +129,14 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
     return np.array(sorted(chosen))
 
 
-def _total_cost(poses, person, x, precision, options, ik) -> float:
+def _total_cost(
+    poses: Poses,
+    person: Person,
+    x: np.ndarray,
+    precision: np.ndarray,
+    options: ScalingOptions,
+    ik: IkOptions,
+) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
     far = np.maximum(d, limit)
     loss = np.where(d <= limit, 0.5 * d**2, limit**2 * (0.5 + np.log(far / limit)))
@@ -232,7 +242,7 @@ def _reduced_equations(
     poses: Poses,
     parameters: tuple[_Parameter, ...],
     options: ScalingOptions,
-    ik: dict,
+    ik: IkOptions,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information (P, P) and gradient (P,) of the geometry with all poses eliminated."""
     at, below = posed(person, poses.q), subtrees(person)
@@ -306,7 +316,7 @@ def refine_over_trials(
     trials: Iterable[TrialMarkers],
     frames: int,
     options: ScalingOptions,
-    ik: dict,
+    ik: IkOptions,
 ) -> Refinement:
     """Fit the geometry to ``frames`` frames of all trials that differ most.
 
@@ -338,7 +348,7 @@ def refine_over_trials(
     return refined(standing.without(misplaced[standing_trial]), kept)
 
 
-def _misplaced(person: Person, one: TrialMarkers, ik: dict) -> np.ndarray:
+def _misplaced(person: Person, one: TrialMarkers, ik: IkOptions) -> np.ndarray:
     """(m,) markers that are not where the model has them throughout a trial."""
     if not len(one.times_s):
         return np.zeros(len(person.markers), dtype=bool)

@@ -258,7 +258,9 @@ def _mean(x: np.ndarray, window: int) -> np.ndarray:
     return uniform_filter1d(x, window, mode="nearest")
 
 
-def _fit(normal: np.ndarray, right: np.ndarray, fourth: np.ndarray, second: float):
+def _fit(
+    normal: np.ndarray, right: np.ndarray, fourth: np.ndarray, second: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients and the band of the posterior covariance over sigma^2."""
     matrix, seconds = normal.copy(), np.full(normal.shape[1] - 2, second)
     for signs, weights in ((_FOURTH, fourth), (_SECOND, seconds)):
@@ -269,7 +271,7 @@ def _fit(normal: np.ndarray, right: np.ndarray, fourth: np.ndarray, second: floa
 
 
 @compiled
-def _inverse_band(factor):
+def _inverse_band(factor: np.ndarray) -> np.ndarray:
     """The band of (L L^T)^-1 for a lower banded factor L (Takahashi's recursion)."""
     width, n = factor.shape
     z = np.zeros((width, n))

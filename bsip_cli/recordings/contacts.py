@@ -65,6 +65,8 @@ class PlateLoad:
 
 @dataclass(frozen=True, eq=False)
 class ContactWindows:
+    """In which frames every contact is measured, and the reasons for those that are left out."""
+
     valid: np.ndarray  # (n_frames,) bool: every contact is measured
     on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
     on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
@@ -294,7 +296,7 @@ def agreeing_mass(
     near = 1.0 + _MISMATCH_SHARE / 2
     above = np.searchsorted(masses, masses * near, side="right")
     count = above - np.searchsorted(masses, masses / near)
-    return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
+    return float(masses[count >= count.max() / 2].max() / np.sqrt(near))
 
 
 # --- which plate measures which foot --------------------------------------------------------------

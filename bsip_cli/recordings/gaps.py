@@ -39,6 +39,8 @@ _RARELY = 0.01  # of a marker's steps are none, outside the hold
 
 @dataclass(frozen=True, eq=False)
 class FilledMarkers:
+    """Positions with short gaps filled, and which of them are not measured."""
+
     markers_m: np.ndarray  # (n_frames, n_markers, 3), what stays missing is NaN
     filled: np.ndarray  # (n_frames, n_markers) bool, True = not measured
     rigid: np.ndarray  # (n_frames, n_markers) bool, the part filled from the segment

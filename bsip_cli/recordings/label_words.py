@@ -10,8 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from itertools import accumulate, chain, pairwise
+from typing import Any
 
-from bsip_cli.config import shipped
+from bsip_cli.files.regular import shipped
 from bsip_cli.recordings.labels import affixes, owner, split
 from bsip_cli.segments import LANDMARKS, SEGMENTS
 
@@ -364,7 +365,7 @@ def _sided(name: str, side: str, known: Sequence[str] | frozenset[str]) -> str:
 
 
 @cache
-def _vocabulary() -> dict:
+def _vocabulary() -> dict[str, Any]:
     return tomllib.loads(shipped("label_words.toml").read_text(encoding="utf-8"))
 
 

@@ -75,6 +75,7 @@ class MeasuredMass:
 
 
 def unknown(reason: str) -> MeasuredMass:
+    """No mass (NaN), for this reason."""
     return MeasuredMass(float("nan"), float("nan"), 0.0, reason)
 
 

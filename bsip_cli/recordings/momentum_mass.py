@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -93,12 +94,12 @@ class Interval:
         common, of_trial = (tuple(up * np.array(each)) for each in (self.common, self.of_trial))
         return replace(self, mass_kg=own, own_sd=up * self.own_sd, common=common, of_trial=of_trial)
 
-    def record(self) -> dict:
+    def record(self) -> dict[str, Any]:
         """For an artifact's facts."""
         return {**asdict(self), **{name: list(getattr(self, name)) for name in _SHARED}}
 
     @classmethod
-    def of(cls, record: Mapping) -> Interval:
+    def of(cls, record: Mapping[str, Any]) -> Interval:
         """From an artifact's facts."""
         shared = {name: tuple(record[name]) for name in _SHARED}
         return cls(**{**record, **shared})

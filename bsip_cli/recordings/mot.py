@@ -58,6 +58,8 @@ class GroundForce:
 
 @dataclass(frozen=True, eq=False)
 class Mot:
+    """What a MOT or STO file holds: times, each plate's force, and what was found odd."""
+
     stamps: Stamps  # (n,)
     forces: tuple[GroundForce, ...]
     findings: tuple[Finding, ...]

@@ -69,7 +69,7 @@ class PlateReading:
     channels: str = ""
     half_size_m: tuple[float, float] | None = None
 
-    def repairs(self) -> dict[tuple, float]:
+    def repairs(self) -> dict[tuple[object, ...], float]:
         """Each, by what it is, and how rare it is, natural logarithm."""
         both = self.channels.startswith("reversed") and " and " in self.channels
         sensors = any(name in CHANNELS_OF[3] for name in self.channels.split())

@@ -14,7 +14,6 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
 from bsip_cli.recordings.contacts import foot_contacts, plate_loads
-from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
 from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange, Opened, PlateSource, lift_N
@@ -22,6 +21,7 @@ from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import by_segment, crossed_limbs, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict, session_reading
+from bsip_cli.recordings.shared_forces import ALIKE_M
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.trunk_motion import low_pass, trunk_reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence

@@ -186,11 +186,12 @@ def reading_of_files(
 
 def _without_forces(trials: Sequence[TrialSamples], names: Collection[str]) -> list[TrialSamples]:
     """Trials as they are, those of these ``names`` without all that tells of forces."""
-    nothing: dict = {"lengths": None, "mass_kg": 0.0, "late": (), "drift_s": 0.0}
-    nothing["course"] = Course()
-    return [
-        replace(one.without(one.sources), **nothing) if one.name in names else one for one in trials
-    ]
+
+    def bare(one: TrialSamples) -> TrialSamples:
+        left = one.without(one.sources)
+        return replace(left, lengths=None, mass_kg=0.0, late=(), drift_s=0.0, course=Course())
+
+    return [bare(one) if one.name in names else one for one in trials]
 
 
 def _of_odd_units(

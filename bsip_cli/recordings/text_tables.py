@@ -307,6 +307,7 @@ def _as_unit(stamps: Stamps, name: str | float, size_s: float, findings: list[Fi
 
 
 def about_unit(found: str, action: str, what: str = "time stamps") -> Finding:
+    """That times, or ``what`` else, are not in seconds, and the ``action`` that corrects it."""
     return Finding("time", "", f"{what} {found}", "times in s", action, "corrected")
 
 

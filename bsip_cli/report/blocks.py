@@ -38,17 +38,23 @@ class Block:
 
 @dataclass(frozen=True)
 class Paragraph(Block):
+    """A text of its own; the tone decides how it is set off."""
+
     text: str
     tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
 class Heading(Block):
+    """Above some of a section's blocks."""
+
     text: str
 
 
 @dataclass(frozen=True)
 class Bullets(Block):
+    """A list in no order."""
+
     items: tuple[str, ...]
     tone: Tone = "plain"
 

@@ -49,6 +49,7 @@ OBJECTS = ("released_object", "implement", "object_handled")
 
 
 def effect_title(effect: str) -> str:
+    """As a table or a heading names it; of an unknown one its name in words."""
     words = EFFECT_WORDS.get(effect)
     return words.title if words else effect.replace("_", " ")
 

@@ -27,7 +27,7 @@ class Origin:
     stage: str
     bsip_version: str
     libraries: dict[str, str]
-    options: dict
+    options: dict[str, Any]
     inputs: dict[str, str]
     messages: tuple[str, ...]
 

@@ -127,6 +127,7 @@ segment_label = in_words  # ``left upper arm`` for upper_arm_l
 
 
 def component_label(component: str) -> str:
+    """A component of the wrench or of the centre of pressure in words, where it has some."""
     return COMPONENTS.get(component, component)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import Config
@@ -100,7 +101,7 @@ def _why_not(unit: Unit, kind: str, maker: str) -> str:
     return _differs(provenance.get(maker), unit.made_by)
 
 
-def _differs(known: Mapping | None, wanted: Mapping) -> str:
+def _differs(known: Mapping[str, Any] | None, wanted: Mapping[str, Any]) -> str:
     """What two provenances do not have in common, as a clause."""
     if known == wanted:
         return ""
@@ -123,7 +124,7 @@ def _differs(known: Mapping | None, wanted: Mapping) -> str:
     return f"other input ({', '.join(inputs[:3])})"
 
 
-def _names(one: Mapping, other: Mapping) -> list[str]:
+def _names(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
 
 

@@ -153,7 +153,7 @@ def work_on(
             by_pipe = {worker.pipe: worker for worker in workers}
             for pipe in wait(list(by_pipe)):
                 end_if_asked()
-                worker = by_pipe[pipe]  # type: ignore[index]
+                worker = by_pipe[pipe]  # type: ignore[index]  # wait gives what it was given
                 try:
                     result = worker.pipe.recv()
                 except (EOFError, OSError):
@@ -168,7 +168,7 @@ def work_on(
         _end(workers, tidy)
 
 
-def _start() -> _Worker:
+def _start() -> _Worker[Task]:
     ours, theirs = _SPAWN.Pipe()
     process = _SPAWN.Process(target=_serve, args=(theirs,), daemon=True)
     with endings_wait():

@@ -17,9 +17,10 @@ from typing import Any
 import pandas as pd
 
 from bsip_cli import __version__, artifacts
-from bsip_cli.config import Config, Load, load_config, shipped
+from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.fingerprints import file_hash
+from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
@@ -208,7 +209,7 @@ class Unit:
         )
 
     @cached_property
-    def made_by(self) -> dict:
+    def made_by(self) -> dict[str, Any]:
         """Provenance of what the unit writes: its inputs as they were when it was first asked."""
         options = self.config.options(self.stage.options)
         for name in ("marker_set", "skeleton"):
@@ -251,7 +252,7 @@ class Unit:
     # --- reading and writing ----------------------------------------------------------------
 
     @staticmethod
-    def shipped_options() -> dict:
+    def shipped_options() -> dict[str, Any]:
         """Every option's value in configs/default.toml."""
         return load_config([]).model_dump()
 
@@ -267,29 +268,29 @@ class Unit:
 
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
-    ) -> dict:
+    ) -> dict[str, Any]:
         """What the producing stage said of its result as a whole."""
         header = artifacts.read_header(self.path(kind, trial, participant), kind)
         return header["provenance"]["facts"]
 
-    def said_before(self, kind: str) -> dict:
+    def said_before(self, kind: str) -> dict[str, Any]:
         """Facts of what the unit has written last; empty where that cannot be read."""
         try:
             return self.facts(kind)
         except BadDataError:
             return {}
 
-    def write(self, kind: str, frame: artifacts.Rows, facts: dict | None = None) -> None:
+    def write(self, kind: str, frame: artifacts.Rows, facts: dict[str, Any] | None = None) -> None:
         artifacts.write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
 
     def write_in_parts(
-        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
+        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict[str, Any]]
     ) -> None:
         """Write what does not fit into memory; the facts are known after the last part."""
         path = self.path(kind)
         artifacts.write_artifact_in_parts(path, kind, parts, lambda: self._notes(facts()))
 
-    def _notes(self, facts: dict) -> dict:
+    def _notes(self, facts: dict[str, Any]) -> dict[str, Any]:
         return {"made_by": self.made_by, "messages": list(self.messages), "facts": facts}
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:

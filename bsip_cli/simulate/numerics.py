@@ -62,6 +62,7 @@ def from_rotation_vector(vectors_rad: np.ndarray) -> np.ndarray:
 
 
 def transpose(matrices: np.ndarray) -> np.ndarray:
+    """Of matrices (..., m, n): (..., n, m), a view."""
     return np.swapaxes(matrices, -1, -2)
 
 

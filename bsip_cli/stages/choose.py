@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -72,7 +73,7 @@ def run(unit: Unit) -> None:
 
 def _row(
     movement: str, use: str, differences: choice.Differences, trials: int, data: str, said: str
-) -> dict:
+) -> dict[str, Any]:
     ratios = {f"ratio_{name}": differences[pair].ratio for pair, name in _COLUMNS.items()}
     errors = {f"log_error_{name}": differences[pair].error for pair, name in _COLUMNS.items()}
     known = {"movement": movement, "use": use, "trials": trials, "data": data, "sentence": said}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -43,7 +44,7 @@ def run(unit: Unit) -> None:
     asked = [diagnosed(unit, of_mass.prior, t, s) for t, s in of_mass.scenes]
     trials = [one for one in asked if one is not None]
     findings: tuple[Finding, ...] = of_mass.findings
-    facts: dict = {"heavier_by": of_mass.share, "trials": [], "causes": []}
+    facts: dict[str, Any] = {"heavier_by": of_mass.share, "trials": [], "causes": []}
     limits = empty_table("detection")
     free = [one for one in trials if one.held is None]
     rng = np.random.default_rng(crc32(unit.name.encode()))
@@ -138,7 +139,7 @@ _WHOLE, _PARTS = "each trial from the others", f"each fifth of a trial from the 
 
 
 def error_budget(
-    unit: Unit, trials: Sequence[Diagnosed], causes: Sequence[Mapping]
+    unit: Unit, trials: Sequence[Diagnosed], causes: Sequence[Mapping[str, object]]
 ) -> tuple[pd.DataFrame, tuple[Finding, ...]]:
     """The ``overall-error-budget``, and what is too large for all that is named or usual.
 
@@ -179,11 +180,11 @@ def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
     )
 
 
-def _rows(lines: Sequence[Line], trial: str, data: str) -> Iterator[dict]:
+def _rows(lines: Sequence[Line], trial: str, data: str) -> Iterator[dict[str, object]]:
     for one in lines:
         factor, unit = scale_of(one.component)
         gain = one.gain
-        alike: dict = {k: getattr(one, k) for k in ("term", "target", "component", "scale")}
+        alike = {k: getattr(one, k) for k in ("term", "target", "component", "scale")}
         known = alike | {"rms": factor * one.rms, "unit": unit, "share_percent": 100 * one.share}
         known |= {"share_low": 100 * one.share_low, "share_high": 100 * one.share_high}
         known |= {"gain_percent": gain.percent, "gain_low": gain.ci_low, "gain_high": gain.ci_high}
@@ -231,7 +232,7 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
     rows = []
     for rank, one in enumerate(findings, start=1):
         gain = zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)
-        known: dict = {name: getattr(one, name) for name in of_all} | dict(gain) | vars(one.words)
+        known = {name: getattr(one, name) for name in of_all} | dict(gain) | vars(one.words)
         known |= {"rank": rank, "trials": ", ".join(one.trials)}
         own, known["persons"] = one.own, one.persons
         for x in one.numbers:
@@ -248,7 +249,7 @@ def nothing(p_value: float, trials: tuple[str, ...]) -> Finding:
     return Finding("none", "", trials, *said, p_value, 1 - p_value, scope="")
 
 
-def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict:
+def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict[str, object]:
     """The faults in full: their values from all data and from each fold's training blocks, for
     ``extend``, and the standard deviation of what is reported if the error's model is exact."""
     session = found.fit.session

@@ -57,7 +57,7 @@ class Diagnosed:
     def moves(self) -> bool:
         return self.trial.role != STATIC
 
-    def with_causes(self, causes: Sequence[Mapping]) -> TrialErrors:
+    def with_causes(self, causes: Sequence[Mapping[str, Any]]) -> TrialErrors:
         """With terms of the causes that concern it, as in the facts of ``overall-diagnosis``."""
         mine = [one for one in causes if self.trial.stem in one["trials"]]
         named = tuple(_named(self.errors.scene, self.errors.filter, mine))
@@ -169,7 +169,7 @@ def diagnosed(
     return Diagnosed(trial, scene, errors, ground, held, *markers)
 
 
-def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator[Term]:
+def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping[str, Any]]) -> Iterator[Term]:
     """Faults with the sizes that the diagnosis has found, and how they might differ."""
     for one in causes:
         effect, target = EFFECTS.get(one["effect"]), one["target"]

@@ -129,7 +129,7 @@ def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
 # --- skeleton ---------------------------------------------------------------------------------
 
 
-def _torso_rows(person: Person, cause: Cause) -> Iterator[dict]:
+def _torso_rows(person: Person, cause: Cause) -> Iterator[dict[str, object]]:
     """The two parts of the torso, whose second joint was named."""
     split = split_torso(person, cause.target, cause.values)
     skeleton, i = person.skeleton, person.skeleton.index(split.segment)

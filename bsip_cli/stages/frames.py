@@ -176,7 +176,7 @@ def load_words(unit: Unit, trial: Trial | None = None) -> str:
     return listing([f"{x.mass_kg:g} kg on the {segment_label(x.segment)}" for x in loads], "")
 
 
-def loads_record(unit: Unit, trial: Trial | None = None) -> list[dict]:
+def loads_record(unit: Unit, trial: Trial | None = None) -> list[dict[str, object]]:
     """Segment, mass and position of each, for an artifact's facts."""
     kept = {"segment", "mass_kg", "position_m"}
     return [x.model_dump(mode="json", include=kept) for x in unit.loads(trial)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -88,8 +89,9 @@ def run(unit: Unit) -> None:
         method: _rarity(unit, problem, method, one, skeleton.body_names)
         for method, one in estimates.items()
     }
-    made: dict = {"reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist()}
-    made["loads"] = {trial.stem: loads_record(unit, trial) for trial in trials}
+    loads = {trial.stem: loads_record(unit, trial) for trial in trials}
+    rms = problem.noise.rms.tolist()
+    made = {"reference_m": reference.tolist(), "noise_rms": rms, "loads": loads}
     unit.write("bsip", pd.concat(tables, ignore_index=True), made)
     unit.write("covariance", _covariance_table(skeleton, roots))
     unit.write("base-parameters", _base_table(skeleton, problem))
@@ -109,7 +111,7 @@ def run(unit: Unit) -> None:
 
 
 def _write_table_only(
-    unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
+    unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict[str, Any]
 ) -> None:
     unit.say(
         f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
@@ -172,7 +174,7 @@ def _identification_trials(
 
 def _rarity(
     unit: Unit, problem: Problem, method: str, estimate: Estimate, names: tuple[str, ...]
-) -> dict:
+) -> dict[str, object]:
     """Columns of ``identification``: whether its body is rarer than people allow; RM+mass is the
     table's body, for which its number stands."""
     if method == RM_MASS:
@@ -244,11 +246,11 @@ def _excitation_table(
     return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
-def _summary(problem: Problem, estimate: Estimate) -> dict:
+def _summary(problem: Problem, estimate: Estimate) -> dict[str, object]:
     """Columns of ``identification``: what it rests on, its mass, and what it leaves."""
     table_kg = float(problem.prior.phi[::10].sum())
     equations = problem.equations
-    row: dict = {"samples": equations.samples, "duration_s": equations.duration_s}
+    row: dict[str, object] = {"samples": equations.samples, "duration_s": equations.duration_s}
     row |= {"effective_samples": float(problem.noise.effective.sum()), "note": estimate.note}
     row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
     row["mass_factor_sd"] = float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg

@@ -76,7 +76,7 @@ class Known:
         ends = [parameter.typical * x for x in (mean, mean - Z95 * sd, mean + Z95 * sd)]
         return Number(parameter.name, parameter.unit, *ends)
 
-    def causes(self, trials: Sequence[TrialErrors]) -> Iterator[dict]:
+    def causes(self, trials: Sequence[TrialErrors]) -> Iterator[dict[str, object]]:
         """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
         and the clock as the others alone show them, who have no other fault."""
         sizes = dict(zip(self.coordinates, self._given_no_other().tolist(), strict=True))
@@ -172,6 +172,7 @@ def alone(sessions: Sequence[Information]) -> dict[Coordinate, tuple[float, floa
 
 
 def coordinates_in(rows: pd.DataFrame) -> tuple[Coordinate, ...]:
+    """What each row is about, by its columns ``_KEY``, in the order of the rows."""
     return tuple(Coordinate(*one) for one in rows[[*_KEY]].itertuples(index=False))
 
 
@@ -195,7 +196,7 @@ def pooled_in(rows: pd.DataFrame) -> Pooled:
     return Pooled(coordinates_in(rows), precision, pull, spread, roots.to_numpy())
 
 
-def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
+def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict[str, object]]:
     """Of ``laboratory-sums``, one for each number of a fault."""
     for k, one in enumerate(pooled.coordinates):
         known = {"spread": pooled.spread[k], "pull": pooled.pull[k]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import cast
+from typing import Any, cast
 from zlib import crc32
 
 import numpy as np
@@ -39,8 +39,8 @@ _MOVED = 0.1  # of its standard deviation: less makes no diagnosis untrue
 _UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
 _TEXTS = "effect target parameter unit verdict since sentence laboratory class_id scope who"
 _NUMBERS = "estimate ci_low ci_high probability limit"
-_NOTHING: dict = dict.fromkeys(_TEXTS.split(), "") | dict.fromkeys(_NUMBERS.split(), np.nan)
-_NOTHING |= {"persons": 0, "trials": 0}
+_NOTHING: dict[str, object] = dict.fromkeys(_TEXTS.split(), "")
+_NOTHING |= dict.fromkeys(_NUMBERS.split(), np.nan) | {"persons": 0, "trials": 0}
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
 
 
@@ -80,9 +80,9 @@ def run_person(unit: Unit) -> None:
     unit.write("laboratory-information", rows, facts)
 
 
-def _session_rows(session: str, information: Information) -> list[dict]:
+def _session_rows(session: str, information: Information) -> list[dict[str, object]]:
     numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
-    rows: list[dict] = []
+    rows: list[dict[str, object]] = []
     for k, (one, parameter, trials) in enumerate(numbers):
         row = {"session": session, **vars(one), "trials": int(trials), "pull": information.pull[k]}
         row |= {name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")}
@@ -109,9 +109,9 @@ class _Session:
 def run(unit: Unit) -> None:
     """Read laboratory-information of all who have it, one after the other; write laboratory, and
     laboratory-sums, by which each person's diagnosis knows what the others show."""
-    rows: list[dict] = []
+    rows: list[dict[str, object]] = []
     laboratories = _laboratories(list(_sessions(unit)))
-    sums: list[dict] = []
+    sums: list[dict[str, object]] = []
     found: dict[str, laboratory_search.Laboratory] = {}
     for number, sessions in enumerate(laboratories, start=1):
         lab = found[str(number)] = _fitted(unit, sessions)
@@ -139,7 +139,7 @@ def run(unit: Unit) -> None:
     unit.write("laboratory-sums", sums, facts)
 
 
-def _answer(unit: Unit, found: Mapping[str, laboratory_search.Laboratory]) -> dict:
+def _answer(unit: Unit, found: Mapping[str, laboratory_search.Laboratory]) -> dict[str, Any]:
     """Mean and standard deviation of every number [typical]; those of before where none has moved
     by a tenth of its standard deviation: what was made with them stays true."""
     now = {}
@@ -207,7 +207,7 @@ def _fitted(unit: Unit, sessions: Sequence[_Session]) -> laboratory_search.Labor
 
 def _rows(
     unit: Unit, laboratory: str, sessions: Sequence[_Session], lab: laboratory_search.Laboratory
-) -> Iterator[dict]:
+) -> Iterator[dict[str, object]]:
     options, mine = unit.config.diagnosis, unit.config.laboratory
     rng = np.random.default_rng(crc32(unit.name.encode()))
     for one in laboratory_search.verdicts_of(lab, options.named_from, rng):
@@ -232,7 +232,7 @@ def _rows(
 
 def _rows_of(
     found: laboratory_search.Verdict, counts: tuple[int, int], cells: Mapping[str, str]
-) -> Iterator[dict]:
+) -> Iterator[dict[str, object]]:
     of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
     of_all |= {"persons": counts[0], "trials": counts[1], **cells}
     of_all |= {"effect": found.cause.effect, "target": found.cause.target}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class PersonMass:
     note: str
 
 
-def stated_mass(unit: Unit, *facts: dict) -> StatedMass | None:
+def stated_mass(unit: Unit, *facts: dict[str, Any]) -> StatedMass | None:
     """From participants.tsv, else the first entry in the ``facts`` of a recording."""
     if unit.person.mass_kg is not None:
         return StatedMass(unit.person.mass_kg, TABLE)

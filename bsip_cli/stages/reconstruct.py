@@ -186,7 +186,7 @@ def gain_rows(errors: dict[str, BlockErrors], method: str, data: str, seed: int)
     return table_of("gain", rows)
 
 
-def _correlations(signals: Signals) -> list[dict]:
+def _correlations(signals: Signals) -> list[dict[str, object]]:
     rows = []
     methods = [name for name in signals if name != MEASURED]
     for a, b in combinations(methods, 2):
@@ -194,7 +194,7 @@ def _correlations(signals: Signals) -> list[dict]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))
             r_a, r_b, r_ab = (correlation(p, q) for p, q in ((x, y), (x, z), (y, z)))
             n = min(effective_samples_of_pair(x, y), effective_samples_of_pair(x, z))
-            known: dict = {"component": component, "method_a": a, "method_b": b}
+            known: dict[str, object] = {"component": component, "method_a": a, "method_b": b}
             known |= {"r_a": r_a, "r_b": r_b, "r_ab": r_ab, "n_effective": n}
             one, other = williams_t(r_a, r_b, r_ab, n), fisher_z_difference(r_a, r_b, n)
             known |= {"williams_t": one.statistic, "df": one.df1, "williams_p": one.p_value}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -33,11 +34,12 @@ _FOUND |= {kind: kind for kind in ("detection", "choice")}
 
 
 def run(unit: Unit) -> None:
+    """Read all of one person; write the page, its figures and their numbers."""
     record = record_of(unit)
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
-    facts: dict = {"light": asdict(light), "large": large_finding(record)}
+    facts: dict[str, Any] = {"light": asdict(light), "large": large_finding(record)}
     facts |= {"first": must_wait(record), "use": use_now(record)}
     unit.write("report-files", rows, facts=facts)
 
@@ -135,6 +137,7 @@ def origin_of(path: Path, label: str) -> records.Origin:
 
 
 def run_group(unit: Unit) -> None:
+    """Read all of the study; write the page, its figures and their numbers."""
     from bsip_cli.report.cohort.document import cohort_document  # heavy
 
     document = cohort_document(cohort_record_of(unit))
@@ -179,7 +182,7 @@ def _read(unit: Unit, kind: str, participant: Participant) -> pd.DataFrame:
     return unit.read(kind, participant=participant) if there else pd.DataFrame()
 
 
-def _facts(unit: Unit, kind: str, participant: Participant) -> dict:
+def _facts(unit: Unit, kind: str, participant: Participant) -> dict[str, Any]:
     """Empty where the artifact is not there."""
     there = unit.path(kind, participant=participant).exists()
     return unit.facts(kind, participant=participant) if there else {}

@@ -219,7 +219,7 @@ def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinemen
     first, person = calibration.person, fit.person
     parents = [skeleton.segments[i] if i >= 0 else "" for i in skeleton.parents]
     moved = person.joint_positions_m() - first.joint_positions_m()
-    table: dict = {"segment": list(skeleton.segments), "parent": parents}
+    table: dict[str, object] = {"segment": list(skeleton.segments), "parent": parents}
     table |= {"joint": list(skeleton.joints), "joint_type": list(skeleton.joint_types)}
     table |= columns([f"joint_{name}" for name in XYZ], person.joint_in_parent_m)
     table |= columns([f"origin_{name}" for name in XYZ], person.origin_in_joint_m)
@@ -236,7 +236,7 @@ def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement)
     squares = np.where(seen, fit.poses.residual_m, 0.0) ** 2
     rms = np.sqrt(squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
     segments = [skeleton.segments[i] for i in person.marker_segments]
-    table: dict = {"marker": list(person.markers), "segment": segments}
+    table: dict[str, object] = {"marker": list(person.markers), "segment": segments}
     table |= columns(XYZ, person.marker_positions_m) | {"weight": person.marker_weights}
     table |= {"shift_m": np.linalg.norm(moved, axis=1)}
     return pd.DataFrame(table | {"residual_m": np.where(seen.any(axis=0), rms, np.nan)})

@@ -51,6 +51,7 @@ SWAY |= {"rms_ap": "mm", "rms_ml": "mm", "rms_ap_origin": "m", "rms_ml_origin": 
 
 
 def run_tests(unit: Unit) -> None:
+    """Read every trial; write the values of each participant and how methods compare."""
     cohort = _Cohort(unit)
     unit.write_in_parts("values", cohort.parts(), cohort.facts)
     unit.write("comparisons", cohort.comparisons(), cohort.facts())
@@ -94,7 +95,7 @@ class _Cohort:
             )
         yield pd.DataFrame(waiting, columns=list(Value._fields))
 
-    def facts(self) -> dict:
+    def facts(self) -> dict[str, Any]:
         """Who is missing where, and what each task's data were to OM."""
         fitted = [
             {"table": table, "task": task, "role": role, **counts}
@@ -201,8 +202,8 @@ class Recording:
         return Value(*place, variable, method, float(value), unit)
 
 
-def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
-    return frame[frame["method"].isin(methods)].to_dict("records")  # type: ignore[return-value]
+def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[Any, Any]]:
+    return frame[frame["method"].isin(methods)].to_dict("records")
 
 
 def _of_parameters(participant: Participant, bsip: pd.DataFrame) -> tuple[list[Value], list[Value]]:
@@ -240,7 +241,7 @@ def _of_recording(recording: Recording) -> list[Value]:
     return values
 
 
-def _of_fit(recording: Recording, method: str, fits: dict[str, dict]) -> Iterator[Value]:
+def _of_fit(recording: Recording, method: str, fits: dict[str, dict[str, Any]]) -> Iterator[Value]:
     """Errors of the centre of pressure, of forces by measure, and as vectors (root mean square);
     of a method, by component."""
     is_sequence = recording.role == "sequence"
@@ -278,6 +279,7 @@ def _correlations(recording: Recording) -> Iterator[tuple[Topic, tuple[float, ..
 
 
 def run_tables(unit: Unit) -> None:
+    """Read the comparisons; write each of the papers' tables in every format."""
     options, facts = unit.config.stats, unit.facts("values")
     criteria = Criteria(options.alpha, options.equivalence_percent)
     compared = unit.read("comparisons")

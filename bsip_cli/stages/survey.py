@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from functools import partial
+from typing import Any
 
 import pandas as pd
 
@@ -43,7 +44,7 @@ _NO_TEST = "what is found in one is no test of the other; remove one of them"
 
 def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
-    rows: list[dict] = []
+    rows: list[dict[str, object]] = []
     facts: dict[str, dict[str, float | str]] = {name: {} for name in _OF_TRIALS}
     written: dict[str, dict[str, float]] = {name: {} for name in asdict(AS_WRITTEN)}
     options = unit.config.ingest
@@ -180,14 +181,14 @@ def prefix_of(unit: Unit) -> str:
     return unit.config.ingest.prefixes.get(unit.person.id, "")
 
 
-def rows_of(session: str, reading: SessionReading) -> list[dict]:
+def rows_of(session: str, reading: SessionReading) -> list[dict[str, object]]:
     """One row per plate; one without a name where none was loaded."""
     frame = {"session": session, **asdict(reading.frame)}
     plates = reading.plates or {"": Verdict()}
     return [frame | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
 
 
-def _row(verdict: Verdict) -> dict:
+def _row(verdict: Verdict) -> dict[str, object]:
     row, nothing = asdict(verdict.reading), float("nan")
     places = *(row.pop("centre_m") or [nothing] * 3), *(row.pop("half_size_m") or [nothing] * 2)
     row |= {"reversed_round": row.pop("mirrored"), "refusal": verdict.refusal}
@@ -200,7 +201,7 @@ def _row(verdict: Verdict) -> dict:
     return row
 
 
-def _verdict(row: dict) -> Verdict:
+def _verdict(row: Mapping[Any, Any]) -> Verdict:
     centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
     same = ("moment_scale", "point_scale", "about", "place_of", "channels")
     known = {name: row[name] for name in same} | {"mirrored": bool(row["reversed_round"])}
@@ -216,7 +217,7 @@ def _verdict(row: dict) -> Verdict:
     return Verdict(reading, before, after, **said)
 
 
-def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:
+def reading_of(table: pd.DataFrame, facts: Mapping[str, Any], trial: Trial) -> SessionReading:
     """What the survey decided, by its ``readings`` and their facts, for a trial's session."""
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:

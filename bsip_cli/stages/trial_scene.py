@@ -114,7 +114,7 @@ def cause_record(
     folds: list[list[float]] | None = None,
     bounds: dict[str, float] | None = None,
     verdict: str = "named",
-) -> dict:
+) -> dict[str, object]:
     """A cause for ``extend``; of the same sizes in every fold where ``folds`` says none."""
     sizes = values.tolist()
     known = {"effect": effect, "target": target, "trials": list(trials), "verdict": verdict}

@@ -51,7 +51,7 @@ class Comparison(samples.TestResult):
         return everything.pop("topic") | everything
 
     @classmethod
-    def from_row(cls, row: Mapping) -> Comparison:
+    def from_row(cls, row: Mapping[Any, Any]) -> Comparison:
         """The comparison that `as_row` wrote down."""
         of_topic = {field.name for field in fields(Topic)}
         topic = Topic(**{name: row[name] for name in of_topic})

@@ -68,13 +68,13 @@ def trial_named(
             remedy="rename it: letters and numbers alone, with _run- and a number behind",
         )
     task, run = match["task"], int(match["run"]) if match["run"] else None
-    named: dict[str, Role] = {t: r for r in ("sequence", "static") for t in roles[r]}  # type: ignore[misc]
+    named: dict[str, Role] = {t: r for r in ("sequence", "static") for t in roles[r]}
     return Trial(participant, task, stem, path, named.get(task, "validation"), run)
 
 
 def merged(faults: Iterable[BadDataError]) -> list[BadDataError]:
     """One refusal for all entries of a folder that have the same fault."""
-    alike: dict[tuple, list[BadDataError]] = {}
+    alike: dict[tuple[Path, str, str], list[BadDataError]] = {}
     for one in faults:
         # What was not fetched is said of several at once, wherever their links lead.
         what = "" if one.remedy == _FETCH else one.found

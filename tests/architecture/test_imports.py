@@ -21,27 +21,27 @@ ALLOWED = {
     "artifacts": "errors files schemas",
     "pipeline": "files schemas",
     "stated": "",
-    "study": "__init__ artifacts body config errors files schemas stated",
+    "study": "__init__ artifacts body errors files schemas stated",
     "running": "__init__ artifacts body config errors files pipeline schemas study",
     "__main__": "cli",
     "library": "__init__ artifacts body config errors pipeline recordings running schemas stages "
     "study",
     "commands": "__init__ artifacts body config diagnosis effects errors files identification "
     "instruments pipeline recordings report running schemas segments stages statistics study",
-    "reference": "cli config effects pipeline report schemas",
+    "reference": "cli config effects files pipeline report schemas",
     "cli": "__init__ commands errors files pipeline running simulate study",
-    "body": "config errors files segments stated",
+    "body": "errors files segments stated",
     "dynamics": "body errors segments",
     "caches": "",
     "motion": "body caches dynamics errors segments",
-    "recordings": "body config errors files segments stated",
+    "recordings": "body errors files segments stated",
     "statistics": "dynamics errors",
-    "identification": "body config dynamics errors segments statistics",
+    "identification": "body dynamics errors files segments statistics",
     "effects": "body dynamics errors motion segments",
     "diagnosis": "body dynamics effects errors identification motion segments statistics",
     "report": "body caches dynamics effects errors motion schemas segments statistics",
     "instruments": "errors files",
-    "simulate": "body config errors files instruments segments",
+    "simulate": "body errors files instruments segments",
     "stages": "artifacts body diagnosis dynamics effects errors files identification motion "
     "pipeline recordings report running schemas segments statistics study",
 }
@@ -82,7 +82,7 @@ def test_reads_the_package():
     """The rules below would hold of nothing too."""
     assert "segments" in inner("simulate.people")
     assert {"numpy", "pandas"} <= foreign("artifacts")
-    assert "shipped" in names_from("body.skeleton", "bsip_cli.config")
+    assert "shipped" in names_from("body.skeleton", "bsip_cli.files.regular")
     assert {package(name) for name in modules()} >= {*SCIENCE, "stages", "report", "simulate"}
 
 
@@ -108,9 +108,8 @@ def test_modules_form_no_circle():
 
 @pytest.mark.parametrize("module", [name for name in sorted(modules()) if package(name) in SCIENCE])
 def test_science_takes_arrays(module):
-    """No tables, no printing; of the configuration only where shipped files lie."""
+    """No tables, no printing."""
     assert not foreign(module) & FOREIGN_TO_SCIENCE
-    assert names_from(module, "bsip_cli.config") <= {"shipped"}
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ import pytest
 
 from bsip_cli.body.markersets import load_marker_set, shipped_names
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import shipped
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.errors import UsageError
+from bsip_cli.files.regular import shipped
 from bsip_cli.segments import LANDMARKS, SEGMENTS, in_words, mirrored, the_joint, without_side
 from tests.body.standing_person import standing, standing_markers
 

@@ -111,5 +111,5 @@ def motion_json(columns: Sequence[Channel], task: str, rate_hz: float, version: 
     )
 
 
-def _json(content: dict) -> str:
+def _json(content: dict[str, object]) -> str:
     return json.dumps(content, indent=2) + "\n"

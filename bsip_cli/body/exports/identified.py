@@ -7,14 +7,14 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
 from bsip_cli.body.person import Person
-from bsip_cli.config import shipped
 from bsip_cli.errors import BadDataError
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 
 # Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
 # (ISB); the two other axes coincide only with the middle angle at 90 degrees.
@@ -23,7 +23,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @cache
-def export_words() -> dict:
+def export_words() -> dict[str, Any]:
     """Of configs/exports.toml."""
     return read_toml(shipped("exports.toml"))
 

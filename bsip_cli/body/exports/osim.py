@@ -30,9 +30,8 @@ from bsip_cli.body.exports.identified import (
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.skeleton import Skeleton, named_file
-from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 
 # A ball or free joint's speeds are no rates of its coordinates, and InverseDynamicsTool (OpenSim
 # 4.6) takes them for that: three turns in a row are a joint whose moments it computes.
@@ -361,6 +360,8 @@ class BodyGroup:
 
 @dataclass(frozen=True)
 class BodyMap:
+    """Which bodies of another OpenSim model, by its name, are which of bsip's segments."""
+
     name: str
     groups: tuple[BodyGroup, ...]
 
@@ -392,6 +393,7 @@ def load_body_map(name: str) -> BodyMap:
 
 
 def shipped_names() -> tuple[str, ...]:
+    """Of the maps in configs/opensim, without ``.toml``."""
     return tuple(sorted(path.stem for path in shipped("opensim").glob("*.toml")))
 
 

@@ -69,6 +69,7 @@ _GAIN = "Do identified parameters follow the forces better?"
 
 
 def cohort_document(record: CohortRecord) -> Document:
+    """The page of a whole study."""
     return Document(
         title="Cohort (all participants): do motion and measured forces agree?",
         subtitle="Ground forces measured by plates, against those computed from markers.",
@@ -328,6 +329,7 @@ def light_of_all(record: CohortRecord) -> Light:
 
 
 def diagnoses_section(record: CohortRecord) -> Section:
+    """Of each participant, what was found, missed or not searched for."""
     people = _searched_people(record)
     blocks: list[Block] = [] if people else [Paragraph(_NOT_RUN, "note")]
     missing = [m.id for m in record.members if m.facts is not None and m.searched is None]

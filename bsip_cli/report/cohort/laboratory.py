@@ -36,6 +36,7 @@ def first(record: CohortRecord) -> Iterator[Block]:
 
 
 def section(record: CohortRecord) -> Section:
+    """A table per laboratory of several persons: what is said, and the likeliest of the rest."""
     table = record.laboratory
     blocks: list[Block] = [Paragraph(_TEXTS["not_run"], "note")] if table is None else []
     if table is not None:

@@ -70,6 +70,7 @@ _OTHER_LINE = Line(PURPLE, "7 1.8 1.1 1.8", 1.1)
 
 
 def line_of(method: str) -> Line:
+    """That of the method, or the one that estimators without their own share."""
     return _LINES.get(method, _OTHER_LINE)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,7 @@ from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 
 def participant_document(record: records.ParticipantRecord) -> Document:
+    """The page of one person."""
     made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
     made += records.how_made(records.HowMade.of(record.origins), record.defaults)
     parameters = (*_choice(record), *_masses(record), *_next(record))
@@ -76,6 +78,7 @@ _MM = 1000.0
 
 
 def recording_section(record: records.ParticipantRecord) -> Section:
+    """Trials, refusals, loads, findings and events of markers."""
     refused = tuple(f"{r.unit or record.id}, {r.stage}: {r.sentence}" for r in record.refusals)
     blocks: list[Block] = [_trials(record)]
     if refused:
@@ -194,7 +197,7 @@ def _choice(record: records.ParticipantRecord) -> Iterator[Block]:
         yield Grid(head, rows, TEXTS["captions"]["choice"], words=2)
 
 
-def _ratio(row: Mapping, name: str) -> str:
+def _ratio(row: Mapping[Any, Any], name: str) -> str:
     ratio = row[f"ratio_{name}"]
     low, high = Difference.of_ratio(ratio, row[f"log_error_{name}"]).interval()
     ends = f" ({number(low, 2)} to {number(high, 2)})" if number(low) != MISSING else ""
@@ -268,6 +271,7 @@ _FAR = 20.0  # times the largest usual size: not seen at all
 
 
 def diagnosis_section(record: records.ParticipantRecord) -> Section:
+    """Causes, advice and what might have gone unseen; or that `diagnose` has not run."""
     if record.diagnosis is None or record.detection is None:
         blocks: tuple[Block, ...] = (Paragraph(verdict.NOT_RUN, "note"),)
         return Section(verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)

@@ -38,6 +38,7 @@ _SHOWN = ("cop_ap", "cop_ml", "grf_vertical")
 
 
 def section(record: ParticipantRecord) -> Section:
+    """Signals over time, what their error is made of, and the error of every recording."""
     blocks = (*_over_time(record), *_budget(record), *_grid(record))
     return Section("errors", "How large are the errors, when, and what makes them?", blocks)
 
@@ -155,6 +156,7 @@ _LEAST_FRAMES = 10  # of a curve
 
 
 def joints_section(record: ParticipantRecord) -> Section:
+    """Moments of one trial's joints, and the largest changes of all peaks."""
     return Section("joints", "What does it change at the joints?", tuple(_blocks(record)))
 
 
@@ -241,6 +243,7 @@ def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
 
 
 def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
+    """Of the trials that have joint moments, with a column ``trial``."""
     return peaks_of((t.stem, t.joint_peaks) for t in trials if t.joint_peaks is not None)
 
 

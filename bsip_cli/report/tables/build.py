@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -170,8 +171,8 @@ RENDERERS: dict[str, Callable[[Table], str]] = {"csv": to_csv, "md": to_markdown
 def build_tables(
     comparisons: pd.DataFrame,
     criteria: Criteria,
-    fitted_on: Sequence[Mapping] = (),
-    missing: Sequence[Mapping] = (),
+    fitted_on: Sequence[Mapping[str, Any]] = (),
+    missing: Sequence[Mapping[str, Any]] = (),
 ) -> tuple[Table, ...]:
     """The six tables as data, and the first four next to the published values.
 

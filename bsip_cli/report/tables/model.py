@@ -48,8 +48,8 @@ def column(
     in_row_unit: bool = False,
 ) -> Column:
     """A column of numbers: ``of`` as ``test.name``, as many as there are names of ``fields``."""
-    numbers = ((*one.split("."), *pair) for one in of.split())
-    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))  # type: ignore[arg-type]
+    numbers = ((test, name, *pair) for test, name in (one.split(".") for one in of.split()))
+    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,12 @@ ABSENT = "-"
 
 
 def unit_label(unit: str) -> str:
+    """A column's unit as print has it."""
     return {"mm2": "mm²", "% body weight": "% BW"}.get(unit, unit)
 
 
 def number(decimals: int) -> Callable[[float], str]:
+    """A form with so many decimals, without a sign before zero."""
     return partial(_rounded, decimals=decimals)
 
 
@@ -147,6 +149,8 @@ def mean_sd(decimals: int) -> Callable[[float, float], str]:
 
 
 def interval(decimals: int) -> Callable[[float, float], str]:
+    """A form of both ends in brackets; absent if one is."""
+
     def form(low: float, high: float) -> str:
         ends = [_rounded(end, decimals) for end in (low, high)]
         return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
@@ -162,6 +166,7 @@ def p_value(p: float) -> str:
 
 
 def count(value: float) -> str:
+    """A whole number."""
     return ABSENT if isnan(value) else f"{value:.0f}"
 
 
@@ -224,6 +229,7 @@ def texts_of(
 
 
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:
+    """The sign if p < alpha, else nothing."""
     return sign if row.p_value < alpha else ""
 
 
@@ -257,7 +263,7 @@ def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ..
     )
 
 
-def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
+def fitted_on(counts: Iterable[Mapping[str, object]]) -> tuple[str, ...]:
     """For each task what its data were to OM: those it was fitted to, or data it never saw.
 
     counts : task, role, and of how many participants (``everyone``) OM was fitted to its data
@@ -277,6 +283,7 @@ def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
 
 
 def named(names: Sequence[str], comma: str = ", ") -> str:
+    """The first names, and how many more there are."""
     shown = comma.join(names[:NAMED_AT_MOST])
     more = len(names) - NAMED_AT_MOST
     return f"{shown}{comma}and {more} more" if more > 0 else shown

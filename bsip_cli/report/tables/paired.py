@@ -56,6 +56,7 @@ def against_rm_mass(criteria: Criteria) -> tuple[model.Column, ...]:
 
 
 def smaller_error(n: str = "n", of_n: str = "paired_t.n") -> Iterator[model.Column]:
+    """How often OM, and how often the other method, errs less, with share and p of the sign test."""
     for other, before in _PREFIX.items():
         counts = f"{before}om_smaller {SHORT[other]}_smaller {before}{n}"
         heading, pair = f"smaller error OM : {other}", (OM, other)

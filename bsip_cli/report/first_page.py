@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -176,10 +176,14 @@ def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks
     if more := record.causes[len(shown) :]:
         address = (("More below", f"#{verdict.ALL_FAULTS}"),)
         first = 1 + len(large) + len(shown)
-        yield blocks.Links("", address, f". {'; '.join(_in_brief(more, first, named))}.")
+        yield blocks.Links(
+            "", address, f". {'; '.join(_in_brief(more, first, named, names_of(record)))}."
+        )
 
 
-def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> Iterator[str]:
+def _in_brief(
+    causes: Sequence[Sequence[Candidate]], first: int, named: int, names: Mapping[str, str]
+) -> Iterator[str]:
     """``3 and 5: marker not in its place``, one alone as it is; findings of which one may be the other count together,
     by the name that most of them may have."""
     groups: list[tuple[list[int], list[str]]] = []
@@ -195,7 +199,8 @@ def _in_brief(causes: Sequence[Sequence[Candidate]], first: int, named: int) -> 
         own = causes[numbers[0] - first]
         what = own[0].words.short or own[0].words.what
         if len(numbers) == len(own) == 1 and len(what.split()) <= _BRIEF_WORDS:
-            yield f"{numbers[0]}: {what}"
+            where = [names[stem] for stem in own[0].trials if stem in names]
+            yield f"{numbers[0]}: {what}{f' ({where[0]})' if len(where) == 1 else ''}"
             continue
         (name, _), *others = Counter(titles).most_common()
         more = f", or {count(len(others), 'other cause')}" if others else ""

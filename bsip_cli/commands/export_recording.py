@@ -32,7 +32,7 @@ from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.plate_wrench import is_noticed, is_silent
-from bsip_cli.recordings.read import delay_words
+from bsip_cli.recordings.session_findings import delay_words
 from bsip_cli.recordings.session_reading import Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow

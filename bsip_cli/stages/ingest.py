@@ -31,7 +31,8 @@ from bsip_cli.recordings.measured_mass import (
 )
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
-from bsip_cli.recordings.read import assemble, findings_about
+from bsip_cli.recordings.read import assemble
+from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import SEGMENTS, TRUNK
 from bsip_cli.stages.frames import WRENCH, XYZ, columns

@@ -22,8 +22,9 @@ from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.recordings.one_person import other_bodies
 from bsip_cli.recordings.plate_reading import FrameChange, Opened, PlateReading
-from bsip_cli.recordings.read import assemble, findings_about, masses_alone, open_recording
+from bsip_cli.recordings.read import assemble, masses_alone, open_recording
 from bsip_cli.recordings.scene import Stature, no_person
+from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, reading_of_files
 from bsip_cli.recordings.shared_forces import same_movements
 from bsip_cli.recordings.trial_samples import TrialSamples

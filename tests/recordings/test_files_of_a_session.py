@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.plate_reading import AS_STATED, Opened
-from bsip_cli.recordings.read import assemble, findings_about, open_recording
+from bsip_cli.recordings.read import assemble, open_recording
+from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.recordings.session_reading import reading_of_files
 from bsip_cli.recordings.shared_forces import Course, of_twins, same_movements
 from bsip_cli.recordings.trial_samples import TrialSamples

@@ -16,7 +16,8 @@ from bsip_cli.recordings.c3d_content import read_content
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_wrench import wrench_at_marker_rate
 from bsip_cli.recordings.plates import CHANNELS_OF
-from bsip_cli.recordings.read import findings_about, open_recording, read_recording
+from bsip_cli.recordings.read import open_recording, read_recording
+from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.recordings.session_reading import session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 

@@ -14,8 +14,9 @@ from bsip_cli.recordings.hypothesis import Hypothesis
 from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate, ForceOnPoint
-from bsip_cli.recordings.read import assemble, findings_about
+from bsip_cli.recordings.read import assemble
 from bsip_cli.recordings.scene import handedness
+from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.recordings.session_reading import SessionReading, Verdict, session_reading
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Feet

@@ -70,8 +70,7 @@ def run(unit: Unit) -> None:
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
     tables = [_table(trial, methods, loads, _left(reasons), noise)]
-    of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
-    for method, its_loads, ok in _extended(unit, trial, of_om):
+    for method, its_loads, ok in _extended(unit, trial, methods, spread):
         tables.append(_table(trial, [method], its_loads, ok, noise))
     table = pd.concat(tables, ignore_index=True)
     unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
@@ -288,7 +287,7 @@ def _columns(person: Person, q: np.ndarray) -> np.ndarray:
 
 
 def _extended(
-    unit: Unit, trial: _Trial, of_om: Spread
+    unit: Unit, trial: _Trial, methods: Sequence[str], spread: Spread
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
     """Method, loads and valid frames (N, J) of the extended models of this trial: forces freed of
     the errors of plates and clock, axes of their tilts; parameters as ``extend`` found them; what
@@ -297,6 +296,7 @@ def _extended(
     models = extended_models(unit, trial.person)
     if models is None:
         return
+    of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for among, phi in models.steps:
         others = (one.effect for one in among if not one.effect.of_the_forces)
         fitting = (one.on_its_segment or isinstance(one, _FIT) for one in others)

@@ -38,7 +38,7 @@ REFUSED = {
     "bad_parameter_section.c3d": "LABELS claims 192 bytes",
     "Optotrak.c3d": "promises 992736 bytes",
     "C3DRotationExample.c3d": "no points",
-    "Eb015si.c3d": "processor 86 (MIPS), which ezc3d does not read",
+    "Eb015si.c3d": "processor 86 (MIPS), which bsip does not read",
 }
 EZC3D_MISREADS = {"type1.C3D", "kyowadengyo.c3d", "evart.c3d"}  # header against parameters
 NOT_FOLLOWED = {"BKINtechnologies.c3d"}  # ezc3d fills 12 GB before it refuses it

@@ -186,7 +186,7 @@ class _Budget:
             return
         model, mine = self.model, _coefficients(parts)
         mixed = np.concatenate([model.session.mixed[p] for p in parts], axis=1)
-        inside = model.covariance[np.ix_(mine, mine)]
+        inside = model.solution.covariance[np.ix_(mine, mine)]
         bare = {
             t: next(x for x in one.terms if x.scale == parts[0].scale)
             for t, one in self.errors.items()
@@ -225,7 +225,7 @@ class _Budget:
     def _spread(self, parts: Sequence[Part]) -> np.ndarray:
         """(8,) standard deviation of a share: it is linear in the coefficients."""
         mine = _coefficients(parts)
-        weights, inside = self.weights[:, mine], self.model.covariance[np.ix_(mine, mine)]
+        weights, inside = self.weights[:, mine], self.model.solution.covariance[np.ix_(mine, mine)]
         return np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
 
     def _gains(self, parts: Sequence[Part]) -> list[ErrorGain]:

@@ -8,16 +8,15 @@ noise of the instruments.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor
-from scipy.linalg.lapack import dpotri, dtrtri
 
 from bsip_cli.diagnosis.error_terms import FAULT, Term, as_simulated
 from bsip_cli.diagnosis.filtering import FLOOR, Filter, recursion_of
+from bsip_cli.diagnosis.normal_equations import Equations, Solution, solved
 from bsip_cli.effects.scene import Scene
 
 # How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
@@ -174,16 +173,6 @@ def noise_like(one: TrialErrors, signal: np.ndarray) -> Noise:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
-    """gram (K', K'), against (K',) : products of white columns about the coefficients ``used``
-    (K',) with themselves and with the residual."""
-
-    used: np.ndarray
-    gram: np.ndarray
-    against: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Fold(Equations):
     """Of some samples ``rows`` of a trial."""
 
@@ -195,17 +184,21 @@ class Fold(Equations):
 class ErrorModel:
     """The posterior of all coefficients.
 
-    mean (K,), covariance (K, K) : of the coefficients. scales : how many times as large as usual.
-    left : per trial (n, 6) what no term explains. adapt : whether scales follow from the data.
+    scales : how many times as large as usual. left : per trial (n, 6) what no term explains.
+    adapt : whether scales follow from the data.
     """
 
     session: Session
-    mean: np.ndarray
-    covariance: np.ndarray
+    solution: Solution
     scales: dict[str, float]
     left: tuple[np.ndarray, ...]
     folds: tuple[Fold, ...]
     adapt: bool
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(K,) of the coefficients."""
+        return self.solution.mean
 
     def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
         """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
@@ -219,7 +212,7 @@ class ErrorModel:
     def without(self) -> tuple[np.ndarray, ...]:
         """Per fold the coefficients (K,), and their scales, of all other folds."""
         others = ([one for one in self.folds if one is not out] for out in self.folds)
-        return tuple(_solution(rest, self.session, self.adapt)[0] for rest in others)
+        return tuple(_solution(rest, self.session, self.adapt)[0].mean for rest in others)
 
 
 def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -> ErrorModel:
@@ -239,10 +232,10 @@ def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -
             for t, signal in enumerate(signals)
             for fold in _folds(session, t, residual[t], signal, parts)
         )
-        mean, covariance, scales = _solution(folds, session, adapt)
-        by_trial = zip(residual, session.columns, session.used, strict=True)
-        left, signals = zip(*(left_by(*one, mean, covariance) for one in by_trial), strict=True)
-    return ErrorModel(session, mean, covariance, scales, left, folds, adapt)
+        solution, scales = _solution(folds, session, adapt)
+        by_trial = enumerate(zip(residual, session.columns, strict=True))
+        left, signals = zip(*(left_by(*one, solution, t) for t, one in by_trial), strict=True)
+    return ErrorModel(session, solution, scales, left, folds, adapt)
 
 
 def _folds(
@@ -258,71 +251,36 @@ def _folds(
 
 
 def left_by(
-    residual: np.ndarray,
-    columns: np.ndarray,
-    used: np.ndarray,
-    mean: np.ndarray,
-    covariance: np.ndarray,
+    residual: np.ndarray, columns: np.ndarray, solution: Solution, trial: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n, 6) what the terms leave, and a signal as large as it may be, they being uncertain."""
-    left = residual - columns @ mean[used]
-    inside = covariance[np.ix_(used, used)]
-    doubt = np.stack([((a @ inside) * a).sum() for a in columns.swapaxes(0, 1)])
+    left = residual - columns @ solution.mean[solution.trials[trial].used]
+    doubt = sum(((columns @ x.T) ** 2).sum(axis=(0, 2)) for x in solution.roots(trial))
     return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
-
-
-def summed(equations: Iterable[Equations], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """(K, K) and (K,) normal equations of some trials, or parts of them."""
-    gram, against = np.zeros((count, count)), np.zeros(count)
-    for one in equations:
-        gram[np.ix_(one.used, one.used)] += one.gram
-        against[one.used] += one.against
-    return gram, against
 
 
 def _solution(
     folds: Sequence[Fold], session: Session, adapt: bool
-) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
-    """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""
-    count = session.count
-    gram, right = summed(folds, count)
-    shown = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
-    shown[np.concatenate([one.used for one in folds])] = True
-    gram, right = gram[np.ix_(shown, shown)], right[shown]
-    place = np.cumsum(shown) - 1
-    at = {scale: place[mine[shown[mine]]] for scale, mine in session.scales.items()}
-    root = np.ones(len(right))
+) -> tuple[Solution, dict[str, float]]:
+    """Coefficients, and the scales of the largest evidence."""
+    by_trial: dict[int, list[Fold]] = {}
+    for one in folds:
+        by_trial.setdefault(one.trial, []).append(one)
+    equations = [
+        Equations(
+            x[0].used, np.sum([k.gram for k in x], axis=0), np.sum([k.against for k in x], axis=0)
+        )
+        for x in by_trial.values()
+    ]
+    shown = np.zeros(session.count, dtype=bool)  # the others, of a trial that is held out, stay
+    shown[np.concatenate([one.used for one in equations])] = True
+    at = {scale: mine[shown[mine]] for scale, mine in session.scales.items()}
+    root = np.ones(session.count)
     for _ in range(_STEPS if adapt else 0):
-        mean, variance = moments(gram, right, root)
-        second = mean**2 + variance
+        found = solved(equations, root)
+        second, root = found.mean**2 + found.variance, root.copy()
         for scale, mine in at.items():
             weight = WEIGHT_OF_FAULTS if scale.startswith(FAULT) else WEIGHT
             root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
-    mean, covariance = posterior(gram, right, root)
     scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
-    if shown.all():
-        return mean, covariance, scales
-    whole = np.zeros(count)
-    whole[shown] = mean
-    return whole, covariance, scales
-
-
-def moments(gram: np.ndarray, right: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (K,) and variance (K,) of coefficients with standard deviations ``root`` (K,)."""
-    inner = gram * np.outer(root, root) + np.eye(len(right))
-    factor, _ = cho_factor(inner, lower=True, overwrite_a=True)
-    inverse, _ = dtrtri(factor, lower=1, overwrite_c=1)
-    inverse = np.tril(inverse)
-    mean = root * (inverse.T @ (inverse @ (root * right)))
-    return mean, root**2 * (inverse**2).sum(axis=0)
-
-
-def posterior(
-    gram: np.ndarray, right: np.ndarray, root: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (K,) and covariance (K, K) of coefficients with standard deviations ``root`` (K,)."""
-    inner = gram * np.outer(root, root) + np.eye(len(right))
-    factor, _ = cho_factor(inner, lower=True, overwrite_a=True)
-    lower, _ = dpotri(factor, lower=1, overwrite_c=1)
-    covariance = (np.tril(lower) + np.tril(lower, -1).T) * np.outer(root, root)
-    return covariance @ right, covariance
+    return solved(equations, root), scales

@@ -138,7 +138,7 @@ def as_simulated(scene: Scene) -> Scene:
         )
         return scene.reading(plates, scene.predicted)
 
-    return scene.once("as simulated", reading)
+    return scene.once("as simulated", reading, of_readings=True)
 
 
 def _of_markers(

@@ -13,19 +13,10 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize
 
-from bsip_cli.diagnosis.error_model import (
-    WEIGHT,
-    Equations,
-    Noise,
-    Session,
-    left_by,
-    moments,
-    noise_like,
-    posterior,
-    summed,
-)
+from bsip_cli.diagnosis.error_model import WEIGHT, Noise, Session, left_by, noise_like
 from bsip_cli.diagnosis.error_terms import FAULT
 from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.diagnosis.normal_equations import Equations, Solution, solved
 
 SIZES = (0.1, 10.0)  # of a fault, in what laboratories meet: two decades about it
 _STEPS, _FEW_STEPS = 8, 2  # of expectation and maximisation
@@ -95,7 +86,7 @@ class Fitted:
     """The model given some faults.
 
     faults : with their values; ``starts``: first coefficient of each, behind the ordinary ones.
-    pieces : of the trials. root, mean (K,), covariance (K, K) : of all coefficients.
+    pieces : of the trials. solution : of all coefficients.
     log_likelihoods : (T,) of the trials at the mean. log_evidence : of all, natural logarithm.
     """
 
@@ -103,28 +94,34 @@ class Fitted:
     faults: tuple[Hypothesis, ...]
     starts: tuple[int, ...]
     pieces: tuple[Piece, ...]
-    root: np.ndarray
-    mean: np.ndarray
-    covariance: np.ndarray
+    solution: Solution
     log_likelihoods: np.ndarray
     log_evidence: float
 
-    @cached_property
-    def sums(self) -> tuple[np.ndarray, float]:
-        """(K,) products of all columns with the white residuals, and the squares of these."""
-        against = summed(self.pieces, len(self.mean))[1]
-        return against, sum(float(one.right @ one.right) for one in self.pieces)
+    @property
+    def mean(self) -> np.ndarray:
+        """(K,) of all coefficients."""
+        return self.solution.mean
+
+    @property
+    def root(self) -> np.ndarray:
+        """(K,) standard deviations of all coefficients before the data."""
+        return self.solution.root
 
     @cached_property
-    def root_of_covariance(self) -> np.ndarray:
-        """(K, K) lower triangle L, covariance L L'."""
-        tiny = 1e-12 * np.trace(self.covariance) / len(self.covariance)
-        return np.linalg.cholesky(self.covariance + tiny * np.eye(len(self.covariance)))
+    def squares(self) -> float:
+        """Of the white residuals."""
+        return sum(float(one.right @ one.right) for one in self.pieces)
 
     def coefficients(self, number: int) -> slice:
         """Of a fault."""
         first = self.starts[number]
         return slice(first, first + len(self.faults[number].values))
+
+    def covariance_of(self, number: int) -> np.ndarray:
+        """(k, k) of the coefficients of a fault."""
+        mine = self.coefficients(number)
+        return self.solution.times(np.eye(len(self.mean))[:, mine])[mine]
 
     def values_at(self, number: int, mean: np.ndarray) -> np.ndarray:
         """(k,) all parameters of a fault, from coefficients (K,)."""
@@ -208,7 +205,7 @@ class _Fitting:
             before = found
             for t in trials:
                 if whole or changed[t]:  # with the noise that the fit leaves
-                    left = left_by(*self.laid[t], found.mean, found.covariance)[1]
+                    left = left_by(*self.laid[t][:2], found.solution, t)[1]
                     pieces[t] = self._like(t, left)
             found = self._solved(pieces, whole)
             if abs(found.log_evidence - before.log_evidence) < _CONVERGED:
@@ -240,26 +237,24 @@ class _Fitting:
 
     def _solved(self, pieces: Sequence[Piece], whole: bool) -> Fitted:
         """Coefficients and scales of the largest evidence for given noise."""
-        gram, against = summed(pieces, self.count)
         for _ in range(_STEPS if whole else _FEW_STEPS):
-            before = self.root.copy()
-            mean, variance = moments(gram, against, self.root)
-            second = mean**2 + variance
+            before, self.root = self.root, self.root.copy()
+            found = solved(pieces, before)
+            second = found.mean**2 + found.variance
             for mine in self.adapts if whole else ():
                 self.root[mine] = np.sqrt((WEIGHT + second[mine].sum()) / (WEIGHT + len(mine)))
             for mine in self.free:
                 self.root[mine] = np.clip(np.sqrt(second[mine].mean()), *SIZES)
             if np.abs(self.root / before - 1).max() < _STEADY:
                 break
-        mean, covariance = posterior(gram, against, self.root)
-        inner = gram * np.outer(self.root, self.root) + np.eye(self.count)
-        log = 0.5 * float(against @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1])
+        found = solved(pieces, self.root)
+        log = 0.5 * float(found.against @ found.mean) - 0.5 * found.log_determinant
         log -= sum(0.5 * float(one.right @ one.right) + one.log_volume for one in pieces)
         scales = np.array([self.root[mine[0]] for mine in self.adapts])
         log -= 0.5 * WEIGHT * float((2 * np.log(scales) + 1 / scales**2 - 1).sum())
-        each = np.array([one.log_likelihood(mean) for one in pieces])
-        copied = self.root.copy(), mean, covariance, each, log
-        return Fitted(self.session, self.faults, self.starts, tuple(pieces), *copied)
+        each = np.array([one.log_likelihood(found.mean) for one in pieces])
+        fixed = self.session, self.faults, self.starts, tuple(pieces)
+        return Fitted(*fixed, found, each, log)
 
 
 # --- the likeliest sizes of one more fault given a fit --------------------------------------------
@@ -277,7 +272,7 @@ class _Marginal:
 
 def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
     free = one.is_free
-    against, squares = fit.sums[0].copy(), fit.sums[1]
+    against, squares = fit.solution.against.copy(), fit.squares
     count = int(free.sum())
     shared = np.zeros((len(fit.mean), count))
     pull, gram = np.zeros(count), np.zeros((count, count))
@@ -293,12 +288,10 @@ def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
         shared[piece.used] += products[:, 1:]
         against[piece.used] -= products[:, 0]
         squares += float(left @ left - piece.right @ piece.right)
-    mean = fit.covariance @ against
-    return _Marginal(
-        squares - float(against @ mean),
-        pull - shared.T @ mean,
-        gram - shared.T @ (fit.covariance @ shared),
-    )
+    found = fit.solution.times(np.column_stack([against, shared]))
+    mean, across = found[:, 0], found[:, 1:]
+    squares -= float(against @ mean)
+    return _Marginal(squares, pull - shared.T @ mean, gram - shared.T @ across)
 
 
 def sized(fit: Fitted, one: Hypothesis) -> Hypothesis:

@@ -21,7 +21,7 @@ from bsip_cli.effects.nameless import UNEXPLAINED
 from bsip_cli.effects.scene import Scene
 
 BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
-_BATCH = 60  # candidates whose signatures are filtered at a time
+_BATCH = 60  # candidates whose signatures are filtered, or made white, at a time
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
 # Part of a parameter, squared, that lies in what the motion does not determine.
 _UNDETERMINED = 1e-3
@@ -101,16 +101,25 @@ class Library:
 
     def log_prior_of(self, kind: Kind) -> float:
         """Logarithm of the prior odds of a kind, whatever the values of a scan."""
-        return float(logsumexp(self.log_prior[self.kinds.get(kind, [])]))
+        return float(np.logaddexp.reduce(self.log_prior[self.kinds.get(kind, [])]))
 
     def products(self, fit: Fitted, trial: int) -> _Products:
         """Of the white signatures of a trial with its residual (C,), with the columns of all terms
         (K', C), and each candidate's with itself (k, k); once for the same noise and faults."""
         piece = fit.pieces[trial]
         if piece not in self._products:
-            white = piece.noise.white(self.columns[trial])
-            grams = {c: white[:, s].T @ white[:, s] for c, s in self.parts[trial].items()}
-            self._products[piece] = white.T @ piece.right, piece.white.T @ white, grams
+            count, grams = self.columns[trial].shape[2], {}
+            with_right, with_columns = np.zeros(count), np.zeros((len(piece.used), count))
+            parts = [*self.parts[trial].items()]
+            for batch in (parts[k : k + _BATCH] for k in range(0, len(parts), _BATCH)):
+                first, last = batch[0][1].start, batch[-1][1].stop
+                white = piece.noise.white(self.columns[trial][..., first:last])
+                with_right[first:last] = white.T @ piece.right
+                with_columns[:, first:last] = piece.white.T @ white
+                for candidate, mine in batch:
+                    own = white[:, mine.start - first : mine.stop - first]
+                    grams[candidate] = own.T @ own
+            self._products[piece] = with_right, with_columns, grams
         return self._products[piece]
 
     @cached_property
@@ -199,19 +208,21 @@ class Scores:
 
 def scores_of(library: Library, fit: Fitted) -> Scores:
     """Given what the model holds by now, its scales and its noise: one linear step."""
-    pulls, inside, grams = [], [], []
+    pulls, inside, grams, lost = [], [], [], []
     for t, piece in enumerate(fit.pieces):
         with_right, with_columns, own = library.products(fit, t)
         pulls.append(with_right - fit.mean[piece.used] @ with_columns)
-        inside.append(fit.root_of_covariance[piece.used].T @ with_columns)
+        alone, together = (x @ with_columns for x in fit.solution.roots(t))
+        inside.append(together)
         grams.append(own)
+        lost.append({c: alone[:, s].T @ alone[:, s] for c, s in library.parts[t].items()})
     count = len(library.places)
     log_factor = np.empty(count)
     sizes, known = [np.zeros(0)] * count, [np.zeros(0)] * count
     saved: list[dict[Effect, list[float]]] = [{} for _ in fit.pieces]
     for width, mine in library.widths.items():
-        pull, taken = np.zeros((len(mine), width)), np.zeros((len(mine), len(fit.mean), width))
-        whole = np.zeros((len(mine), width, width))
+        pull, taken = np.zeros((len(mine), width)), np.zeros((len(mine), len(inside[0]), width))
+        whole, gone = np.zeros((2, len(mine), width, width))
         for n, k in enumerate(mine):
             place = library.places[k]
             for t in place.trials:
@@ -219,7 +230,8 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
                 pull[n] += pulls[t][part]
                 taken[n] += inside[t][:, part]
                 whole[n] += grams[t][place.candidate]
-        information = whole - taken.swapaxes(1, 2) @ taken
+                gone[n] += lost[t][place.candidate]
+        information = whole - gone - taken.swapaxes(1, 2) @ taken
         values, vectors = np.linalg.eigh(information)
         least = 1e-9 * np.trace(whole, axis1=1, axis2=2) + 1e-300  # less is rounding
         values = np.maximum(values, least[:, None])

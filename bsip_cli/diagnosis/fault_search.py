@@ -251,7 +251,7 @@ def _chosen(
         effect, target, trials = kind
         new = all((effect.name, target, t) not in known for t in trials)
         if new and closed.isdisjoint(trials) and (asked is None or asked & set(trials)):
-            kinds[kind] = logsumexp(log[mine])
+            kinds[kind] = np.logaddexp.reduce(log[mine])
     taken: Counter[tuple[Effect, bool]] = Counter()
     for kind in sorted(kinds, key=lambda kind: -kinds[kind]):
         lasting = (kind.effect, len(kind.trials) > 1)

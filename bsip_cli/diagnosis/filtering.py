@@ -91,4 +91,4 @@ def every(scene: Scene, enough_hz: float) -> Scene:
 
 def slow(scene: Scene) -> Scene:
     """The trial at the rate at which nuisances and signatures, smooth as they are, are computed."""
-    return scene.once("slow", lambda: every(scene, ENOUGH_HZ))
+    return scene.once("slow", lambda: every(scene, ENOUGH_HZ), of_readings=True)

@@ -99,8 +99,7 @@ def _numbers(
     Its variance counts as many times as the trials' candidates explain more than chance; what no
     recording betters comes on top.
     """
-    one, mine = fit.faults[number], fit.coefficients(number)
-    covariance = fit.covariance[mine, mine] * inflation
+    one, covariance = fit.faults[number], fit.covariance_of(number) * inflation
     known_to = np.array([p.known_to for p in one.parameters])
     spread = np.hypot(known_to, SCALE_ERROR * one.values * one.is_free)
     none = np.zeros(len(one.values))

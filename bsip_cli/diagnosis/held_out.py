@@ -9,8 +9,9 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
-from bsip_cli.diagnosis.error_model import Session, posterior, summed
+from bsip_cli.diagnosis.error_model import Session
 from bsip_cli.diagnosis.fault_model import Fitted, columns_of
+from bsip_cli.diagnosis.normal_equations import Equations, solved
 from bsip_cli.statistics.samples import Z95
 
 FOLDS = 5
@@ -112,21 +113,15 @@ def _means(
 ) -> np.ndarray:
     """(FOLDS, K) coefficients without each fold, those that are not ``kept`` zero; ``more`` is
     added to a trial's white residual."""
-    count = len(fit.mean)
-    gram, against = summed(fit.pieces, count)
-    for t, offset in more.items():
-        against[fit.pieces[t].used] += fit.pieces[t].white.T @ offset
-    means = np.zeros((FOLDS, count))
+    means = np.zeros((FOLDS, len(fit.mean)))
     for fold in range(FOLDS):
-        its, to = gram.copy(), against.copy()
+        equations = []
         for t, piece in enumerate(fit.pieces):
-            rows = blocks[t] % FOLDS == fold
-            white = piece.white[rows]
-            right = (piece.right + more.get(t, 0.0))[rows]
-            its[np.ix_(piece.used, piece.used)] -= white.T @ white
-            to[piece.used] -= white.T @ right
-        block = np.ix_(kept, kept)
-        means[fold, kept] = posterior(its[block], to[kept], fit.root[kept])[0]
+            offset, rows = more.get(t, np.zeros(len(piece.right))), blocks[t] % FOLDS == fold
+            white, right = piece.white[rows], (piece.right + offset)[rows]
+            against = piece.against + piece.white.T @ offset - white.T @ right
+            equations.append(Equations(piece.used, piece.gram - white.T @ white, against))
+        means[fold] = solved(equations, fit.root * kept).mean
     return means
 
 
@@ -147,15 +142,16 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
 
     inflation (T,) : the trials' likelihoods count by so much less.
     """
-    one, root = fit.faults[number], fit.root_of_covariance
+    one = fit.faults[number]
     pulls, grams, shared = [], [], []
     for t, trial in zip(one.trials, one.in_trials, strict=True):
         piece, block = fit.pieces[t], trial.blocks
         mine = block[:, None, None] == np.arange(block.max() + 1)
         white = piece.noise.white(np.where(mine, one.filtered_change(trial)[..., None], 0.0))
         pulls.append(white.T @ piece.left(fit.mean) / inflation[t])
-        grams.append(white.T @ white / inflation[t])
-        shared.append(root[piece.used].T @ (piece.white.T @ white) / np.sqrt(inflation[t]))
+        alone, together = (x @ (piece.white.T @ white) for x in fit.solution.roots(t))
+        grams.append((white.T @ white - alone.T @ alone) / inflation[t])
+        shared.append(together / np.sqrt(inflation[t]))
     taken = np.concatenate(shared, axis=1)
     gram, pull = block_diag(*grams) - taken.T @ taken, np.concatenate(pulls)
     within: list[float] = []  # logarithms of the Bayes factors of a step in each trial

@@ -16,10 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of, summed
+from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of
 from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated
 from bsip_cli.diagnosis.fault_model import fitted
 from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.diagnosis.normal_equations import summed
 from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect, Parameter

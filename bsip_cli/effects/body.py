@@ -262,24 +262,21 @@ class Breathing(Effect):
             Parameter("frequency", "Hz", slowest, 0.7, apart, paces, known_to=PACE_HZ),
         )
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        cosine, sine, frequency = values
-        pace = 2 * np.pi * frequency
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The change is linear in cosine and sine."""
+        pace = 2 * np.pi * values[2]
         phase = pace * (scene.times_s - scene.times_s[0])
-        moved = (cosine * np.cos(phase) + sine * np.sin(phase))[:, None]
-        speed = pace * (sine * np.cos(phase) - cosine * np.sin(phase))
+        moved = np.stack([np.cos(phase), np.sin(phase)])[..., None]
+        speed = pace * np.stack([-np.sin(phase), np.cos(phase)])[..., None]
         i, motion = scene.person.skeleton.index(target), scene.motion
         out = motion.rotation[:, i] @ OUTWARD
         w, dw = motion.turning_rad_s[:, i], motion.turning_acceleration_rad_s2[:, i]
-        force = (
-            -(pace**2) * moved * out
-            + 2 * speed[:, None] * np.cross(w, out)
-            + moved * (np.cross(dw, out) + np.cross(w, np.cross(w, out)))
-        )
+        turned = np.cross(dw, out) + np.cross(w, np.cross(w, out))
+        force = moved * (turned - pace**2 * out) + 2 * speed * np.cross(w, out)
         centre = scene.centre(target)
         carried = centre.acceleration_m_s2 - scene.model.gravity.linear
-        moment = np.cross(centre.position_m, force) + np.cross(moved * out, carried)
-        return np.hstack([force, moment])
+        moment = np.cross(centre.position_m, force) + moved * np.cross(out, carried)
+        return np.moveaxis(np.concatenate([force, moment], axis=2), 0, 2)
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         amplitude = float(np.hypot(values[0], values[1]))

@@ -119,8 +119,9 @@ class Held(Effect):
         """(N,) 1 while it is held, for the moments among the values; a ramp over one frame keeps
         the derivative with respect to a moment alive."""
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return values[0] * self.held(scene, values[1:])[:, None] * carried(scene, target)
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The change is linear in the mass."""
+        return (self.held(scene, values[1:])[:, None] * carried(scene, target))[..., None]
 
 
 class ReleasedObject(Held):

@@ -38,9 +38,8 @@ class Nameless(Effect):
 
 def in_channel(scene: Scene, channel: str, signal: np.ndarray) -> np.ndarray:
     """(N, 6) a signal (N,) in one component of the whole wrench, about where the person stands."""
-    wrench = np.zeros((len(signal), 6))
-    wrench[:, CHANNELS.index(channel)] = signal
-    return move_moments(wrench, -place_of_stance_m(scene))
+    of_one = np.eye(6)[[CHANNELS.index(channel)]]
+    return signal[:, None] * move_moments(of_one, -place_of_stance_m(scene))
 
 
 def signal_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
@@ -64,7 +63,9 @@ class Tone(Nameless):
         slowest, fastest = 2.0 / duration, min(self.FASTEST_HZ, 0.16 * scene.rate_hz)
         regular = np.linspace(slowest, fastest, min(60, int((fastest - slowest) * duration)))
         key = (UNEXPLAINED, target)
-        lines = scene.once(key, lambda: self._lines_hz(scene, target, slowest, fastest))
+        lines = scene.once(
+            key, lambda: self._lines_hz(scene, target, slowest, fastest), of_readings=True
+        )
         paces = tuple(float(f) for f in (*regular, *lines))
         return (
             Parameter("cosine", unit, -1e3, 1e3, _LARGE[unit]),
@@ -91,9 +92,10 @@ class Tone(Nameless):
         lines = hertz[peaks[np.argsort(-found["peak_heights"])][: self.MOST_LINES]]
         return lines[(lines > slowest) & (lines < fastest)]
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
-        return in_channel(scene, target, values[0] * np.cos(phase) + values[1] * np.sin(phase))
+        waves = np.cos(phase), np.sin(phase)
+        return np.stack([in_channel(scene, target, wave) for wave in waves], axis=-1)
 
     def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
         size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"

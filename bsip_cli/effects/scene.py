@@ -76,7 +76,7 @@ class Plate:
 
 _OF_THE_MOTION = {
     *("rate_hz", "model", "predicted", "motion", "response", "trust", "pose_response"),
-    *("markers_m", "model_markers_m", "centre_of_mass_m", "at_rest"),
+    *("markers_m", "model_markers_m", "centre_of_mass_m", "at_rest", "_kept"),
 }
 
 
@@ -136,7 +136,7 @@ class Scene:
 
     def reading(self, plates: tuple[Plate, ...], wrench: np.ndarray) -> Scene:
         """The same motion over other readings: nothing of the motion is computed again."""
-        other = replace(self, plates=plates, wrench=wrench)
+        other, _ = replace(self, plates=plates, wrench=wrench), self._kept
         known = {name: x for name, x in vars(self).items() if name in _OF_THE_MOTION}
         vars(other).update(known)
         return other
@@ -228,11 +228,17 @@ class Scene:
     def _kept(self) -> dict[Hashable, Any]:
         return {}
 
-    def once(self, key: Hashable, make: Callable[[], Made]) -> Made:
-        """What ``make`` returns, computed when it is first asked for under this key."""
-        if key not in self._kept:
-            self._kept[key] = make()
-        return self._kept[key]
+    @cached_property
+    def _kept_of_readings(self) -> dict[Hashable, Any]:
+        return {}
+
+    def once(self, key: Hashable, make: Callable[[], Made], of_readings: bool = False) -> Made:
+        """What ``make`` returns, computed when it is first asked for under this key: of the motion,
+        the same over all readings, or ``of_readings``."""
+        kept = self._kept_of_readings if of_readings else self._kept
+        if key not in kept:
+            kept[key] = make()
+        return kept[key]
 
     @cached_property
     def centre_of_mass_m(self) -> np.ndarray:
@@ -320,4 +326,4 @@ def without_fast(wrench: np.ndarray, stride: int) -> np.ndarray:
 
 def place_of_stance_m(scene: Scene) -> np.ndarray:
     """(3,) where the person stands on the ground: moments about it are small."""
-    return np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
+    return scene.once("stance", lambda: np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0))

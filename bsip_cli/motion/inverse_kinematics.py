@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -271,18 +271,18 @@ class PoseResponse:
         """(N, nv, nv) of the weighted normal matrix, with a weak prior on all coordinates."""
         nv = len(self.person.skeleton.v_names)
         inverse = np.empty((len(self.q), nv, nv))
-        for part, at in self._blocks():
+        for part, at in self._blocks:
             weighted = _flat(np.sqrt(self.weights[part])[..., None, None] * at.columns())
             information = weighted.swapaxes(1, 2) @ weighted
             information[:, range(nv), range(nv)] += _PRIOR_M**2
             inverse[part] = np.linalg.inv(information)
         return inverse
 
-    def _blocks(self) -> Iterator[tuple[slice, Posed]]:
+    @cached_property
+    def _blocks(self) -> list[tuple[slice, Posed]]:
         """Some frames after the others: the columns of all at once may not fit into memory."""
-        for start in range(0, len(self.q), _BLOCK):
-            part = slice(start, start + _BLOCK)
-            yield part, posed(self.person, self.q[part])
+        parts = (slice(start, start + _BLOCK) for start in range(0, len(self.q), _BLOCK))
+        return [(part, posed(self.person, self.q[part])) for part in parts]
 
     def of(self, errors_m: np.ndarray, markers: Sequence[int] | slice = slice(None)) -> np.ndarray:
         """(N, nv, k) change of the pose, in the tangent space.
@@ -290,7 +290,7 @@ class PoseResponse:
         errors_m : (N, m, 3, k) [m] of all markers, world axes, or only of those numbered.
         """
         moved = np.empty((len(self.q), self.inverse.shape[1], errors_m.shape[-1]))
-        for part, at in self._blocks():
+        for part, at in self._blocks:
             weighted = self.weights[part][:, markers, None, None] * errors_m[part]
             moved[part] = _flat(at.columns(markers)).swapaxes(1, 2) @ _flat(weighted)
         return self.inverse @ moved
@@ -308,7 +308,7 @@ class PoseResponse:
         """
         moved = self.of(errors_m, markers) if moved is None else moved
         left = np.empty((*self.weights.shape, 3, errors_m.shape[-1]))
-        for part, at in self._blocks():
+        for part, at in self._blocks:
             change = -(_flat(at.columns()) @ moved[part]).reshape(left[part].shape)
             change[:, markers] += errors_m[part]
             left[part] = at.turns().swapaxes(2, 3) @ change

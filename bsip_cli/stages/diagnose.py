@@ -273,7 +273,6 @@ def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict
 def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
     """Standard deviation of all that a fault reports, by the slope of that."""
     fit, one = found.fit, found.fit.faults[verdict.number]
-    mine = fit.coefficients(verdict.number)
     slopes = []
     for step in _STEP * np.diag(one.typical):
         ahead, behind = (
@@ -282,7 +281,7 @@ def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
         )
         slopes.append((ahead - behind) / (2 * _STEP))
     slope = np.stack(slopes, axis=1)
-    spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance[mine, mine], slope))
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance_of(verdict.number), slope))
     names = [name for name, *_ in one.reported()]
     return dict(zip(names, spread.tolist(), strict=True))
 

@@ -406,6 +406,15 @@ def test_changed_role_rebuilds_the_skeleton(run):
     assert trial == "sub-01_task-squat_run-1"
 
 
+def test_joint_moments_of_whom_nothing_was_identified(run):
+    for kind in ("bsip", "covariance", "extended-bsip"):
+        table = run.read(kind)
+        run.rewrite(kind, table[table["method"].isin(["RM", "RM+mass"])])
+    stem = f"sub-01_{TRIALS[1]}"
+    assert run.perform("joints", stem).state == "done"
+    assert set(run.read("joint-moments", stem)["method"]) == {"RM", "RM+mass"}
+
+
 def test_force_redoes_with_the_same_result(run, bsip):
     content, times = run.content(), run.times()
     answer = bsip("regress", run.study, "--out", run.out, "--force")

@@ -26,6 +26,8 @@ _OUTPUT_NAMES = re.compile(
 _AXIS_ENDINGS = "OALP"  # Plug-in Gait draws a segment by four points, PELO PELA PELL PELP
 _HEAD = re.compile(r"[^\W_]+[_.\- ]+")  # of the person, in front of most labels
 _FIRST_YEAR = 1987  # of the format
+_FEW_PERCENT = 2.0  # of positions may be ghosts
+_NEAR_FLOOR_M = 0.12  # markers of a foot that stands
 
 
 def open_c3d(path: Path) -> Opened:
@@ -86,7 +88,7 @@ def _ups(
         def stand(up: scene.Up, up_of_plates: scene.Up) -> bool:
             turn, of_plates = map(scene.rotation_to_z_up, (up, up_of_plates))
             turned = [corners @ of_plates.T for corners in surfaces]
-            return scene.stands_on(labels, positions_m @ turn.T, turned)
+            return _stands_on(labels, positions_m @ turn.T, turned)
 
         if (
             by_labels
@@ -103,6 +105,23 @@ def _ups(
         or scene.Up(2, 1, "nothing says otherwise")
     )
     return up, up
+
+
+def _stands_on(
+    labels: Sequence[str], markers_m: np.ndarray, surfaces_m: Sequence[np.ndarray]
+) -> bool:
+    """Whether a person of markers (n_frames, n_markers, 3) is over surfaces of corners (4, 3), both
+    Z-up: none of the body under the floor, and at times a foot on a surface."""
+    floor_m = np.median([corners[:, 2].mean() for corners in surfaces_m])
+    heights = markers_m[..., 2] - floor_m
+    if np.nanpercentile(heights, _FEW_PERCENT) < -_NEAR_FLOOR_M:
+        return False
+    by_part = scene.by_segment(labels, markers_m)
+    feet = [by_part[name].reshape(-1, 3) for name in ("foot_l", "foot_r") if name in by_part]
+    seen = np.concatenate([np.zeros((0, 3)), *feet])
+    low = seen[np.abs(seen[:, 2] - floor_m) < _NEAR_FLOOR_M, :2]
+    edges = ((one[:, :2].min(axis=0), one[:, :2].max(axis=0)) for one in surfaces_m)
+    return any(((low > least) & (low < most)).all(axis=1).any() for least, most in edges)
 
 
 # --- the points -----------------------------------------------------------------------------------

@@ -42,8 +42,6 @@ _HIGH = ("head", "upper_torso")
 _CLEARLY_ABOVE_M = 0.2
 _CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
-_FEW_PERCENT = 2.0  # of positions may be ghosts
-_NEAR_FLOOR_M = 0.12  # markers of a foot that stands
 
 _FEW_FRAMES = 50  # by which sides are found
 _AHEAD_OF = {"legs": "pelvis", "arms": "trunk"}  # parts of `Handedness`
@@ -382,23 +380,6 @@ def rotation_to_z_up(up: Up) -> np.ndarray:
     z = np.where(np.arange(3) == up.axis, float(up.sign), 0.0)
     x = np.eye(3)[1 if up.axis == 0 else 0]
     return np.array([x, np.cross(z, x), z])
-
-
-def stands_on(
-    labels: Sequence[str], markers_m: np.ndarray, surfaces_m: Sequence[np.ndarray]
-) -> bool:
-    """Whether a person of markers (n_frames, n_markers, 3) is over surfaces of corners (4, 3), both
-    Z-up: none of the body under the floor, and at times a foot on a surface."""
-    floor_m = np.median([corners[:, 2].mean() for corners in surfaces_m])
-    heights = markers_m[..., 2] - floor_m
-    if np.nanpercentile(heights, _FEW_PERCENT) < -_NEAR_FLOOR_M:
-        return False
-    by_part = by_segment(labels, markers_m)
-    feet = [by_part[name].reshape(-1, 3) for name in ("foot_l", "foot_r") if name in by_part]
-    seen = np.concatenate([np.zeros((0, 3)), *feet])
-    low = seen[np.abs(seen[:, 2] - floor_m) < _NEAR_FLOOR_M, :2]
-    edges = ((one[:, :2].min(axis=0), one[:, :2].max(axis=0)) for one in surfaces_m)
-    return any(((low > least) & (low < most)).all(axis=1).any() for least, most in edges)
 
 
 def findings_about(up: Up, of_forces: Up) -> list[Finding]:

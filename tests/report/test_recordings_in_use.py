@@ -380,8 +380,8 @@ def test_findings_without_room_are_named_with_their_numbers(record):
     links, _ = (block for block in front(many) if isinstance(block, Links))
     assert links.to == (("More below", "#wrong"),)
     assert links.rest == (
-        f". 3: plate 1 is turned by +2.0 degrees; 4 to 6: {effect_title('soft_tissue')}, or 1 "
-        "other cause."
+        f". 3: plate 1 is turned by +2.0 degrees ({SEQUENCE}); "
+        f"4 to 6: {effect_title('soft_tissue')}, or 1 other cause."
     )
 
 

@@ -380,7 +380,7 @@ def test_findings_without_room_are_named_with_their_numbers(record):
     links, _ = (block for block in front(many) if isinstance(block, Links))
     assert links.to == (("More below", "#wrong"),)
     assert links.rest == (
-        f". 3: plate 1 is turned by +2.0 degrees ({SEQUENCE}); "
+        ". 3: plate 1 is turned by +2.0 degrees (sequence); "
         f"4 to 6: {effect_title('soft_tissue')}, or 1 other cause."
     )
 

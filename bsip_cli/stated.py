@@ -7,7 +7,9 @@ import unicodedata
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
+
+from bsip_cli.files.regular import read_toml, shipped
 
 BMI_KG_M2 = (12.0, 60.0)
 """Body-mass indices of people: survival ends at 11 to 13 (Henry 1990, Eur J Clin Nutr 44), healthy
@@ -19,23 +21,21 @@ USUAL_BMI_KG_M2 = (12.0, 40.0)
 
 @dataclass(frozen=True)
 class Quantity:
-    """A mass or a height: its column, the limits [SI] of what people have, and units [SI].
-
-    ``names`` are what people call it, in small letters and without blanks.
-    ``guessed`` are units that are looked for where none is stated, ``slips`` those that are looked
-    for where the stated one cannot be; what they make below ``guessed_low`` is not meant.
-    """
+    """A mass or a height, as configs/people_words.toml has it; ``unit`` is that of SI."""
 
     column: str
-    unit: str
+    names: str
+    example: str
     low: float
     high: float
     units: dict[str, float]
     guessed: tuple[str, ...]
     slips: tuple[str, ...]
-    names: str
-    example: str
     guessed_low: float = 0.0
+
+    @property
+    def unit(self) -> str:
+        return self.column.rpartition("_")[2]
 
     def holds(self, value: float) -> bool:
         return self.low <= value <= self.high
@@ -46,45 +46,18 @@ class Quantity:
         return unit if unit in self.units else ""
 
 
-MASS = Quantity(
-    "mass_kg",
-    "kg",
-    10.0,
-    400.0,
-    {"kg": 1.0, "g": 1e-3, "lb": 0.45359237, "st": 6.35029318, "N": 1 / 9.80665},
-    ("kg", "g", "lb", "st", "N"),
-    ("kg", "g"),
-    "mass weight bodymass bodyweight masse gewicht körpergewicht koerpergewicht körpermasse "
-    "koerpermasse poids peso massa massecorporelle",
-    "62.6 kg, 138 lb or 9 st 12 lb",
-)
-HEIGHT = Quantity(
-    "height_m",
-    "m",
-    0.5,
-    2.6,
-    {"m": 1.0, "cm": 0.01, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
-    ("m", "cm", "mm", "in"),  # 5.4 may be feet or 5 ft 4 in
-    ("m", "cm", "mm", "in"),
-    "height stature bodyheight grösse größe groesse körpergrösse körpergröße koerpergroesse "
-    "taille talla altura estatura altezza statura",
-    "1.68 m, 168 cm or 5 ft 6 in",
-    0.75,  # the median at one year (WHO 2006), before which children do not walk: 66 are inches
-)
-_SPELLINGS = {
-    "kg": "kg kgs kilo kilos kilogram kilograms kilogramm",
-    "g": "g gram grams gramm",
-    "lb": "lb lbs pound pounds",
-    "st": "st stone stones",
-    "N": "n newton newtons",
-    "m": "m metre metres meter meters mètre metro metros",
-    "cm": "cm centimetre centimetres centimeter centimeters zentimeter",
-    "mm": "mm millimetre millimetres millimeter millimeters",
-    "in": "in inch inches \" ''",
-    "ft": "ft foot feet '",
-}
+_WORDS = read_toml(shipped("people_words.toml"))
+
+
+def _quantity(column: str) -> Quantity:
+    said = dict(_WORDS[column])
+    lists: Any = {name: tuple(said.pop(name).split()) for name in ("guessed", "slips")}
+    return Quantity(column, **said, **lists)
+
+
+MASS, HEIGHT = _quantity("mass_kg"), _quantity("height_m")
 _DIGITS = 6  # of a kg or m: 163 cm are 1.63 m
-_SPELT = {spelling: unit for unit, line in _SPELLINGS.items() for spelling in line.split()}
+_SPELT = {one: unit for unit, line in _WORDS["units"].items() for one in line.split()}
 # The unit of a second number that has none, as in 5'4, and how many make the first one.
 _BELOW = {"ft": ("in", 12), "st": ("lb", 14), "m": ("cm", 100)}
 _QUOTES = str.maketrans("‘’′´`“”″", "'''''\"\"\"")
@@ -232,37 +205,8 @@ def with_other(rows: Mapping[str, Row]) -> dict[str, Row]:
     return {**rows, OTHER: mean}
 
 
-# Titles of such a column in each language, and pairs of words, a woman's first; a third is neither.
-_LANGUAGES = (
-    ("sex gender", "female male other, woman man, women men, girl boy"),
-    ("sexo genero género", "mujer hombre, mujer varón, femenino masculino"),
-    ("sexo genero género", "mulher homem, feminino masculino"),
-    ("sexe genre", "femme homme, féminin masculin, fille garçon"),
-    ("sesso genere", "femmina maschio, femminile maschile, donna uomo"),
-    ("geschlecht", "weiblich männlich divers, weiblich maennlich divers, frau mann, frau herr"),
-    ("", "vrouw man, vrouwelijk mannelijk"),
-    ("", "kvinna man"),
-    ("", "kvinde mand"),
-    ("", "kvinne mann"),
-    ("", "nainen mies"),
-    ("", "naine mees"),
-    ("", "kobieta mężczyzna, kobieta mezczyzna"),
-    ("", "žena muž"),
-    ("", "ženska moški, žensko muško"),
-    ("", "nő férfi"),
-    ("", "femeie bărbat, feminin masculin"),
-    ("", "kadın erkek, kadin erkek"),
-    ("", "moteris vyras"),
-    ("", "sieviete vīrietis"),
-    ("", "γυναίκα άνδρας, θήλυ άρρεν"),
-    ("", "женский мужской, женщина мужчина, жен муж"),
-    ("", "perempuan laki-laki, wanita pria"),
-    ("", "女 男, 女性 男性"),
-)
-COLUMN_NAMES = " ".join(dict.fromkeys(" ".join(titles for titles, _ in _LANGUAGES).split()))
-_OTHERS = (
-    "n/a na none unknown diverse nonbinary non-binary intersex autre andere otro altro outro ? -"
-)
+_LANGUAGES = [one.get("titles", "").split() for one in _WORDS["sex"]["languages"]]
+COLUMN_NAMES = " ".join(dict.fromkeys(title for titles in _LANGUAGES for title in titles))
 _OTHER_LETTERS = "o u"  # unless they begin a word of the column's language
 
 _Pair = dict[str, Sex]
@@ -279,14 +223,14 @@ def _pair(words: str) -> _Pair:
     return pair
 
 
-_PAIRS = [(k, _pair(words)) for k, (_, line) in enumerate(_LANGUAGES) for words in line.split(",")]
-_SEX_OF: dict[str, Sex] = {
-    **{
-        word: sex for _, pair in _PAIRS for word, sex in pair.items() if len(word) > 1 or word > "z"
-    },
-    **dict.fromkeys(("", *_OTHERS.split()), OTHER),
-    **dict.fromkeys(["hembra", "mädchen", "maedchen"], "F"),
-}
+_PAIRS = [
+    (k, _pair(words))
+    for k, language in enumerate(_WORDS["sex"]["languages"])
+    for words in language["pairs"].split(",")
+]
+_SEX_OF: dict[str, Sex] = {w: s for _, p in _PAIRS for w, s in p.items() if len(w) > 1 or w > "z"}
+_SEX_OF |= dict.fromkeys(("", *_WORDS["sex"]["others"].split()), OTHER)
+_SEX_OF |= dict.fromkeys(_WORDS["sex"]["female"].split(), "F")
 _CODE = re.compile(r"([\w?-]+)\s*[=:]\s*([\w/?-]+)")
 
 
@@ -339,7 +283,7 @@ def _spoken(cells: Collection[str], title: str) -> list[_Pair]:
         if all(_meaning(cell, pair) for cell in begun)
         and words <= {word for other, one in _PAIRS if other == k for word in one}
     ]
-    own = [(k, pair) for k, pair in fitting if title.casefold() in _LANGUAGES[k][0].split()]
+    own = [(k, pair) for k, pair in fitting if title.casefold() in _LANGUAGES[k]]
     pairs = [pair for _, pair in own or fitting]
     alone = {word for word in words if not word.startswith(tuple(begun))}
     shown = [len(alone & {*pair}) for pair in pairs]

@@ -20,7 +20,7 @@ ALLOWED = {
     "schemas": "files",
     "artifacts": "errors files schemas",
     "pipeline": "files schemas",
-    "stated": "",
+    "stated": "files",
     "study": "__init__ artifacts body errors files schemas stated",
     "running": "__init__ artifacts body config errors files pipeline schemas study",
     "__main__": "cli",

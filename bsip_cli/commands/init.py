@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
-from bsip_cli.files.folders import check_path, is_folder
+from bsip_cli.files.regular import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
 from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson

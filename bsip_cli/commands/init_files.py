@@ -13,18 +13,14 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.fingerprints import file_hash
-from bsip_cli.files.folders import ENDINGS, entries, is_folder, lies_in
-from bsip_cli.files.regular import fault_of
+from bsip_cli.files.regular import ENDINGS, entries, fault_of, is_folder, lies_in
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Recording, StatedPerson
 from bsip_cli.recordings.mot import read_mot
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.study.new_study import Found
+from bsip_cli.study.new_study import WORDS, Found
 from bsip_cli.study.trials import PACKED, RECORDINGS
 
-_FORCES = "grf grfs grw forces force kinetics ground reaction fp plates"
-_MARKERS = "trc marker markers mrk traj trajectories mocap"
-_OF_FILES = frozenset(f"{_FORCES} {_MARKERS}".split())
 NO_RECORDING = "no recording"
 _WINDOW_S = 0.5
 _FASTEST = 90.0  # percentile
@@ -170,7 +166,7 @@ def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
 def trial_words(path: Path) -> tuple[str, ...]:
     """What is left of a file's name without the words for markers and forces."""
     parts = [part.casefold() for part in re.split(r"[\W_]+", path.stem) if part]
-    return tuple(part for part in parts if part not in _OF_FILES)
+    return tuple(part for part in parts if part not in WORDS["files"])
 
 
 # --- reading --------------------------------------------------------------------------------------

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.files.folders import forces_beside
-from bsip_cli.files.regular import check_regular
+from bsip_cli.files.regular import check_regular, forces_beside
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 
 METRES = {"m": 1.0, "mm": 1e-3}

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bsip_cli.files.folders import forces_beside
+from bsip_cli.files.regular import forces_beside
 from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.model import Finding, Recording, refusal

@@ -15,8 +15,7 @@ import click
 import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files.folders import ENDINGS, entries, is_folder, lies_in
-from bsip_cli.files.regular import check_regular, fault_of
+from bsip_cli.files.regular import ENDINGS, check_regular, entries, fault_of, is_folder, lies_in
 from bsip_cli.instruments.c3d_file import rewrite_c3d
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot

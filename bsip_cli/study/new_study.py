@@ -12,38 +12,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bsip_cli.files.regular import read_toml, shipped
+
 STILL_M_S = 0.1
 """Mean speed of markers over half a second: people who stand sway by centimetres a second, in slow
 movements the limbs go several times faster."""
 
 
-def _set_of(words: str) -> frozenset[str]:
-    return frozenset(words.split())
+WORDS = {key: frozenset(x.split()) for key, x in read_toml(shipped("recording_words.toml")).items()}
+"""In names of recordings and folders, by what they mean."""
 
-
-_STATIC = _set_of(
-    "static statics statisch statique estatico estatica statico statica calib calibration kalib "
-    "kalibrierung kalibration calibracion calibrazione calibracao neutral neutre neutro tpose "
-    "npose apose anatomical anatomic scal"
-)
-# Words that movements have too, as in sit to stand: these must be still nearly all the time.
-_PERHAPS_STATIC = _set_of("cal st pose stand standing stehen debout anat reference ref")
-_SEQUENCE = _set_of("sequence sequenz identification identify excitation")
-# Folders that sort recordings, and name nobody.
-_SORTING = (
-    _STATIC
-    | _PERHAPS_STATIC
-    | _set_of(
-        "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
-        "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
-        "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
-        "inputs input output condition cond block task tasks"
-    )
-)
-_PERSONS = _set_of(
-    "s sub subj subject p part participant pat patient pt vp pp proband probandid id sujet "
-    "sujeto soggetto sbj hc"
-)
+_STATIC, _PERHAPS_STATIC = WORDS["static"], WORDS["perhaps_static"]
+_SORTING = _STATIC | _PERHAPS_STATIC | WORDS["sorting"]
 _LONGEST_TASK = 40  # letters
 _LONGEST_RUN = 4  # digits; longer ones are dates and belong to the name
 _ENOUGH_LABELS = 0.5  # shared, of the recording with fewer: else nothing says that it is one set
@@ -212,7 +192,7 @@ def _are_people(guessed: Sequence[str], recordings: Sequence[Found]) -> bool:
         return False
     letters = [{w for w in words(one) if w.isalpha()} for one in guessed]
     have_digits = all(re.search(r"\d", one) for one in guessed)
-    if have_digits and all(one and one <= _PERSONS for one in letters):
+    if have_digits and all(one and one <= WORDS["persons"] for one in letters):
         return True
     pairs = zip(guessed, recordings, strict=True)
     static = {word for word, one in pairs if _is_called_static(one.stem.replace(word, " ", 1))}
@@ -304,7 +284,7 @@ def _only_sorts(folder: str) -> bool:
 
 def is_sequence(task: str) -> bool:
     """Whether a task's name says that it is for identification."""
-    return not _SEQUENCE.isdisjoint(words(task))
+    return not WORDS["sequence"].isdisjoint(words(task))
 
 
 def _rest(stem: str, participant: str) -> list[str]:

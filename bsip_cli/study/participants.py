@@ -11,8 +11,7 @@ from itertools import product
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files.folders import is_folder
-from bsip_cli.files.regular import fault_of, read_text_table
+from bsip_cli.files.regular import fault_of, is_folder, read_text_table
 from bsip_cli.stated import (
     COLUMN_NAMES,
     HEIGHT,
@@ -211,9 +210,9 @@ class PeopleTable:
         return frozenset(row.cells[k] for row in self.rows if k < len(row.cells))
 
 
-def named_in(file: Path) -> list[str]:
-    """Whom participants.tsv names, each once, without names that cannot be."""
-    names = (row.id for row in read_people(file).rows)
+def named_in(study: Path) -> list[str]:
+    """Whom a study's participants.tsv names, each once, without names that cannot be."""
+    names = (row.id for row in read_people(study / "participants.tsv").rows)
     return [name for name in dict.fromkeys(names) if NAME.fullmatch(name)]
 
 

@@ -12,8 +12,7 @@ from pathlib import Path
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_bytes
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files.folders import check_path, entries, is_folder, lies_in
-from bsip_cli.files.regular import fault_of
+from bsip_cli.files.regular import check_path, entries, fault_of, is_folder, lies_in
 from bsip_cli.study.participants import NAME, Participant, participant_of, read_people, rows_of
 from bsip_cli.study.trials import (
     RECORDINGS,

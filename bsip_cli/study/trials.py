@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files.folders import ENDINGS, entries, forces_beside, is_folder, trial_stem
-from bsip_cli.files.regular import fault_of
+from bsip_cli.files.regular import ENDINGS, entries, fault_of, forces_beside, is_folder, trial_stem
 from bsip_cli.schemas import SCHEMAS
 
 Role = Literal["static", "sequence", "validation"]

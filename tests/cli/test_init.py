@@ -12,7 +12,7 @@ import pytest
 from bsip_cli.commands.init import init_command
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files.folders import ENDINGS
+from bsip_cli.files.regular import ENDINGS
 from bsip_cli.study.study import load_study
 from tests.fuzz.fuzz_study import _write_trc_mot
 

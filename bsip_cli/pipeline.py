@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bsip_cli.files.regular import read_toml, shipped
 
@@ -58,32 +58,26 @@ class Stage:
         getattr(import_module(self.module), self.function)(unit)
 
 
-def _read() -> tuple[Stage, ...]:
-    """The stages of ``configs/stages.toml``, which says what its entries mean."""
-    data = read_toml(shipped("stages.toml"))
-    return tuple(_stage(data["summaries"], data["scene"], **row) for row in data["stages"])
+_TABLE = read_toml(shipped("stages.toml"))
 
 
-def _stage(
-    summaries: dict[str, str],
-    scene: str,
-    *,
-    step: str,
-    does: str,
-    reads_recordings: bool = False,
-    costs_s: float = _SHORT_S,
-    **kinds: str,
-) -> Stage:
-    """``kinds``: names of kinds and options, by spaces."""
+def _stage(package: str, *, step: str, does: str = "", **said: Any) -> Stage:
+    """An entry of the table, which says what they mean; its module is in that package."""
     name, level, part = (*step.split(), "")[:3]
-    module, function = does.split()
-    lists: Any = {key: tuple(x.replace("@scene", scene).split()) for key, x in kinds.items()}
-    lists |= {"part": part, "reads_recordings": reads_recordings, "costs_s": costs_s}
-    lists |= {"level": level, "module": "bsip_cli.stages." + module, "function": function}
-    return Stage(name, summary=summaries[name], **lists)
+    module, function = (*does.split(), "", "")[:2]
+    said = {
+        key: tuple(x.replace("@scene", _TABLE["scene"]).split()) if isinstance(x, str) else x
+        for key, x in said.items()
+    }
+    # joined: `code_hash` takes a text of it for an import of all that may stand there
+    of_code = ".".join(("bsip_cli", package, module))
+    said |= {"module": of_code, "function": function, "part": part}
+    return Stage(name, cast("Level", level), _TABLE["summaries"].get(name, ""), **said)
 
 
-STAGES = _read()
+STAGES = tuple(_stage("stages", **row) for row in _TABLE["stages"])
+READERS = {(s.name, s.part): s for s in (_stage("commands", **row) for row in _TABLE["readers"])}
+"""Commands that read as a stage does, by name and part."""
 
 FINDINGS = ("choose", "diagnose", "laboratory", "extend", "report")
 """Stages whose sentences are results; those of the others are remarks on the way."""

@@ -13,14 +13,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 import click
-from annotated_types import Ge, Gt, Le, Lt, MinLen
-from pydantic.fields import FieldInfo
 
 from bsip_cli.cli import cli
-from bsip_cli.config import Config, Section
+from bsip_cli.config import Config
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
 from bsip_cli.files.regular import shipped
@@ -183,7 +181,8 @@ def _found(effect: str) -> str:
 # --- options ----------------------------------------------------------------------------------
 
 
-_SIGNS = ((Gt, "gt", ">"), (Ge, "ge", "≥"), (Lt, "lt", "<"), (Le, "le", "≤"))
+_LIMITS = {"minItems": "at least", "exclusiveMinimum": ">", "minimum": "≥"}
+_LIMITS |= {"exclusiveMaximum": "<", "maximum": "≤"}
 
 
 @dataclass(frozen=True)
@@ -232,7 +231,7 @@ def options_page() -> str:
     for section in dict.fromkeys(option.section for option in options):
         lines = []
         for option in (one for one in options if one.section == section):
-            limits = _limits(field_of(section, option.name))
+            limits = _limits(section, option.name)
             unit = option.unit.removeprefix("1")
             value = f"`{option.default}` {unit}".strip() + f" ({limits})" * bool(limits)
             lines.append(f"- `{option.name}` = {value}: {option.meaning}")
@@ -243,29 +242,17 @@ def options_page() -> str:
     return _page("The options", parts)
 
 
-def field_of(section: str, name: str) -> FieldInfo:
-    """The definition that checks an option."""
-    model: type[Section] = Config
-    if section:
-        model = Config.model_fields[section].annotation  # type: ignore[assignment]  # a Section
-    return model.model_fields[name]
+def schema_of(section: str) -> dict[str, Any]:
+    """The JSON schema of a section, or of the file."""
+    whole = Config.model_json_schema()
+    return whole["$defs"][section.capitalize()] if section else whole
 
 
-def _limits(field: FieldInfo) -> str:
-    words = _choices(field.annotation)
-    for rule in field.metadata:
-        if isinstance(rule, MinLen):
-            words.append(f"at least {rule.min_length}")
-        for kind, attribute, sign in _SIGNS:
-            if isinstance(rule, kind):
-                words.append(f"{sign} {getattr(rule, attribute)}")
-    return ", ".join(words)
-
-
-def _choices(annotation: Any) -> list[str]:
-    if get_origin(annotation) is Literal:
-        return [" or ".join(f"`{value}`" for value in get_args(annotation))]
-    return [choice for part in get_args(annotation) for choice in _choices(part)]
+def _limits(section: str, name: str) -> str:
+    known = schema_of(section)["properties"][name]
+    choices = known.get("items", known).get("enum", ())
+    words = [" or ".join(f"`{value}`" for value in choices)] if choices else []
+    return ", ".join([*words, *(f"{x} {known[key]}" for key, x in _LIMITS.items() if key in known)])
 
 
 # --- artifacts --------------------------------------------------------------------------------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,11 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError, printable
 from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.prior import Prior
 from bsip_cli.identification.problem import Problem
-from bsip_cli.pipeline import Stage
+from bsip_cli.pipeline import READERS
 from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.model import TEXTS, Column, Row, Table
 from bsip_cli.report.words import listing, number, segment_label
-from bsip_cli.running.runner import Outcome, State, held_alone, lacking
+from bsip_cli.running.runner import attempt, held_alone
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
@@ -31,16 +32,7 @@ from bsip_cli.stages.frames import load_phi, loads_record, person_of
 from bsip_cli.study.study import Trial
 from bsip_cli.study.trials import listed
 
-# Not a stage of the pipeline, but it reads and writes as one.
-_READER = Stage(
-    "compare-loads",
-    "participant",
-    "Recordings with a known load against those without.",
-    reads=("wrench", "skeleton", "marker-positions", "kinematics", "regression"),
-    writes=("load-comparison",),
-    options=("skeleton", "loads", "roles", "prior", "identify"),
-    module="bsip_cli.commands.compare_loads",
-)
+_READER = READERS["compare-loads", ""]
 _OPTIONS = ("--with", "--without")
 _TEXTS = TEXTS["compare_loads"]
 _Line = tuple[str | float, ...]
@@ -48,41 +40,33 @@ TWO, LOADED, ALL = "two identifications", "loaded segments", "all"
 
 
 def compare_loads(
-    root: Path, out: Path, participant: str, config_file: Path | None, names: tuple[str, str]
+    study: Path, out: Path, participant: str, config_file: Path | None, heavy: str, plain: str
 ) -> int:
     """Compare one participant's recordings, print the tables and return the exit code.
 
-    ``names``: what --with and --without were given, tasks or names of recordings joined by commas;
-    empty where the declared loads decide.
+    ``heavy`` and ``plain``: what --with and --without were given, tasks or names of recordings
+    joined by commas; empty where the declared loads decide.
     """
-    opened = open_study(root, out, (participant,), config_file)
+    opened = open_study(study, out, (participant,), config_file)
     people = opened.study.participants
     units = [Unit(_READER, opened.study, out, opened.config, person) for person in people]
-    code = follow("compare-loads", opened.refusals, _compare(units, names), len(units), out)
+    running = (attempt(unit, partial(_compared, unit, (heavy, plain))) for unit in units)
+    code = follow("compare-loads", opened.refusals, running, len(units), out)
     for unit in units if code == 0 else ():
         for table in _tables(unit):
             click.echo(to_markdown(table))
     return code
 
 
-def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, None, None]:
-    for unit in units:
-        if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
-            yield waiting
-            continue
-        without_loads = unit.config_of_all.model_copy(update={"loads": ()})
-        loads_off = Unit(_READER, unit.study, unit.out, without_loads, unit.participant)
-        loads_off.messages = unit.messages  # what is said of its recordings is said of both
-        state: State = "done"
-        code = 0
-        try:
-            with held_alone(unit.out / unit.name):
-                _compared(unit, loads_off, _sets(unit, names))
-        except BsipError as error:
-            remove(unit.path("load-comparison"))  # an older one would pass for this one
-            unit.warn(str(error))
-            state, code = "refused", error.exit_code
-        yield Outcome(_READER.name, unit.name, state, tuple(unit.messages), code)
+def _compared(unit: Unit, names: tuple[str, str]) -> tuple[()]:
+    """Write the table; all that is said of it is a message of the unit."""
+    try:
+        with held_alone(unit.out / unit.name):
+            _write(unit, _sets(unit, names))
+    except BsipError:
+        remove(unit.path("load-comparison"))  # an older one would pass for this one
+        raise
+    return ()
 
 
 # --- which recordings -------------------------------------------------------------------------
@@ -213,9 +197,10 @@ _SHORTEST_S = 0.5
 _Z95 = 1.96
 
 
-def _compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[Trial]]) -> None:
-    """Identify from the trials with and from those without, and write the table. ``loads_off``: the
-    same unit without the declared loads, which stay in the forces."""
+def _write(unit: Unit, sets: tuple[Sequence[Trial], Sequence[Trial]]) -> None:
+    """Identify from the trials with and from those without, and write the table."""
+    without_loads = unit.config_of_all.model_copy(update={"loads": ()})  # they stay in the forces
+    loads_off = replace(unit, config=without_loads)  # what it says, the unit says
     person = person_of(unit)
     skeleton = person.skeleton
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,10 +25,10 @@ from bsip_cli.commands.export_recording import export_recordings
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
-from bsip_cli.pipeline import Stage
+from bsip_cli.pipeline import READERS
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import SIDES
-from bsip_cli.running.runner import Outcome, held_alone, lacking
+from bsip_cli.running.runner import Outcome, attempt, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
@@ -49,25 +50,14 @@ Texts = tuple[dict[str, str], str]
 _EDGE = 5
 
 
-def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
-    if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
-        return waiting
-    folder = folder_of(unit, asked.to)
-    try:
-        with held_alone(unit.out / unit.person.id):
-            texts, note = _TABLES[asked.what][0](unit, model)
-            for name, text in texts.items():
-                write_bytes(folder / name, text.encode())
-    except BsipError as error:
-        return Outcome("export", unit.name, "refused", (str(error),), error.exit_code)
-    said = (f"{unit.name}: {note}",) if note else ()
-    names = ", ".join(Path(name).name for name in texts)
-    return Outcome("export", unit.name, "done", (*said, f"{unit.name}: {folder}: {names}"))
-
-
-def folder_of(unit: Unit, to: Path | None) -> Path:
-    """Where a participant's files go."""
-    return unit.out / unit.person.id / "export" if to is None else to / unit.person.id
+def _export_tables(unit: Unit, asked: Request, model: str) -> Iterator[str]:
+    folder = asked.folder_of(unit)
+    with held_alone(unit.out / unit.person.id):
+        texts, note = _TABLES[asked.what](unit, model)
+        for name, text in texts.items():
+            write_bytes(folder / name, text.encode())
+    yield from filter(None, [note])
+    yield f"{folder}: {', '.join(Path(name).name for name in texts)}"
 
 
 def _joints(unit: Unit, _: str) -> Texts:
@@ -128,25 +118,10 @@ def _opensim(unit: Unit, model: str) -> Texts:
     return texts, note + "; known loads are not in the model" * bool(unit.loads())
 
 
-# By what is asked for: who writes it, what that reads, and options.
-_MOTION = "kinematics contacts wrench plates skeleton marker-positions"
-_TABLES: dict[str, tuple[Callable[[Unit, str], Texts], str, str]] = {
-    "joints": (_joints, "joint-moments", ""),
-    "bids": (_bids, "markers kinematics wrench", "skeleton"),
-    "opensim": (_opensim, _MOTION, "skeleton loads joints"),
-}
+# By what is asked for, who writes it.
+_TABLES = {"joints": _joints, "bids": _bids, "opensim": _opensim}
 
-
-# Not a stage of the pipeline, but it reads as one.
-_READER = Stage(
-    "export",
-    "participant",
-    "Models for other software.",
-    reads=("skeleton", "marker-positions", "bsip"),
-    writes=(),
-    options=("skeleton",),
-    reads_if_there=("choice",),
-)
+_READER = READERS["export", "model"]
 _OF_TRIALS = ("recording", "bids", "joints")
 _FILE_NAME = re.compile(r"[A-Za-z0-9_+-]+")
 
@@ -168,45 +143,49 @@ class Request:
     what: str = "model"
     to: Path | None = None
 
+    def folder_of(self, unit: Unit) -> Path:
+        """Where a participant's files go."""
+        person = unit.person.id
+        return unit.out / person / "export" if self.to is None else self.to / person
+
 
 # Of an identified person: the text of the file, and what else the user should know of it.
 Writer = Callable[[IdentifiedPerson], tuple[str, str]]
 
 
 def export_session(
-    root: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None, request: Request
+    study: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None, **asked: Any
 ) -> int:
-    """Export a study's participants and return the exit code."""
+    """Export a study's participants and return the exit code; ``asked`` is a `Request`."""
+    request = Request(**asked)
     _check(request)
-    opened = open_study(root, out, chosen, config_file)
-    skeleton = load_skeleton(opened.config.skeleton)
-    study, to, what = opened.study, request.to, request.what
+    opened = open_study(study, out, chosen, config_file)
+    skeleton, people = load_skeleton(opened.config.skeleton), opened.study.participants
+    to, what = request.to, request.what
     if what == "recording":
         assert to is not None
         return export_recordings(opened, out, to)
     formats = {"model": request.formats, "opensim": ("osim",)}
     models = replace(request, formats=formats.get(what, ()))
     writers = _writers(models, skeleton) if what in formats else {}
-    _, reads, options = _TABLES.get(what, (None, "", ""))
-    kinds = tuple(reads.split()), (), tuple(options.split())
-    of_trials = Stage("export", "trial", "Tables of a trial.", *kinds)
-    trials = {one.id: one.trials if what in _TABLES else () for one in study.participants}
+    trials = {one.id: one.trials if what in _TABLES else () for one in people}
 
     def running() -> Generator[Outcome, None, None]:
-        for participant in study.participants:
-            model, whole = "", (study, out, opened.config, participant)
+        for participant in people:
+            model, whole = "", (opened.study, out, opened.config, participant)
             if writers:
                 model, outcome = _export(Unit(_READER, *whole), skeleton, request, writers)
                 yield outcome
                 if outcome.state != "done":
                     continue
             for trial in trials[participant.id]:
-                yield _export_tables(Unit(of_trials, *whole, trial), request, model)
+                unit = Unit(READERS["export", what], *whole, trial)
+                yield attempt(unit, partial(_export_tables, unit, request, model))
 
     if what == "bids" and to is not None:
         to.mkdir(parents=True, exist_ok=True)
-        describe_dataset(to, study.root)
-        shutil.copyfile(study.root / "participants.tsv", to / "participants.tsv")
+        describe_dataset(to, study)
+        shutil.copyfile(study / "participants.tsv", to / "participants.tsv")
     total = sum(bool(writers) + len(own) for own in trials.values())
     return follow("export", opened.refusals, running(), total, to or out)
 
@@ -279,7 +258,7 @@ def _export(
     not stop the others."""
     if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
         return "", waiting
-    folder = folder_of(unit, request.to)
+    folder = request.folder_of(unit)
     written: list[str] = []
     notes: list[str] = []
     errors: list[BsipError] = []

@@ -4,83 +4,76 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from
-from bsip_cli.commands import named_causes as named
 from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.nameless import UNEXPLAINED
-from bsip_cli.effects.plates import ALL, Delay, loaded_plates
+from bsip_cli.effects.plates import ALL, Delay, FrameRate, loaded_plates
 from bsip_cli.effects.scene import Scene
-from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
+from bsip_cli.errors import BadDataError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
-from bsip_cli.files.folders import is_folder, lies_in
+from bsip_cli.files.regular import is_folder, lies_in
 from bsip_cli.instruments.c3d_file import rewrite_c3d
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
-from bsip_cli.pipeline import Stage
+from bsip_cli.pipeline import READERS
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.plate_wrench import is_noticed, is_silent
 from bsip_cli.recordings.session_findings import delay_words
 from bsip_cli.recordings.session_reading import Verdict
-from bsip_cli.running.runner import Outcome, lacking
+from bsip_cli.running.runner import attempt
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import markers_from, person_of, plate_wrenches
 from bsip_cli.stages.survey import opened, reading_of
-from bsip_cli.stages.trial_scene import plates_of
-
-_OF_TRIALS = ("readings", "markers", "wrench", "plates", "marker-events")
-_READER = Stage(
-    "export",
-    "trial",
-    "The recording without its named faults.",
-    reads=(*_OF_TRIALS, "skeleton", "marker-positions", "overall-diagnosis"),
-    writes=(),
-    options=("skeleton", "ingest"),
-    reads_if_there=("laboratory",),
+from bsip_cli.stages.trial_scene import (
+    causes_here,
+    is_corrected,
+    of_the_laboratory,
+    plates_of,
 )
+
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
 _AT_ONCE_S = 1e-9
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
+NO_FAULT_OF_IT = "no fault of the plates, the clocks, the axes or the labels"
+_NO_INTERVAL = np.full((1, 2), np.nan)
+
 
 def export_recordings(asked: OpenedStudy, out: Path, folder: Path) -> int:
     """Copy the study into a new folder, its recordings corrected; the exit code."""
-    study = asked.study
-    _copy_study(study.root, out, folder)
-
-    def running() -> Generator[Outcome, None, None]:
-        for participant in study.participants:
-            for trial in participant.trials:
-                unit = Unit(_READER, study, out, asked.config, participant, trial)
-                yield _corrected(unit, folder)
-
-    total = sum(len(one.trials) for one in study.participants)
-    return follow("export", asked.refusals, running(), total, folder)
+    _copy_study(asked.study.root, out, folder)
+    whole = READERS["export", "recording"], asked.study, out, asked.config
+    people = asked.study.participants
+    units = [Unit(*whole, person, trial) for person in people for trial in person.trials]
+    running = (attempt(unit, partial(_corrected, unit, folder)) for unit in units)
+    return follow("export", asked.refusals, running, len(units), folder)
 
 
 def _copy_study(root: Path, out: Path, folder: Path) -> None:
     """All but results and hidden files; the folder is new or empty and lies outside."""
+    found = ""
     if lies_in(folder, root) or lies_in(folder, out) or lies_in(root, folder):
-        raise UsageError(
-            "lies in the study or its results, or holds it",
-            file=folder,
-            remedy="name a new folder with --to",
-        )
-    if os.path.lexists(folder) and not (is_folder(folder) and not any(folder.iterdir())):
-        raise UsageError("is not empty", file=folder, remedy="name a new folder with --to")
+        found = "lies in the study or its results, or holds it"
+    elif os.path.lexists(folder) and not (is_folder(folder) and not any(folder.iterdir())):
+        found = "is not empty"
+    if found:
+        raise UsageError(found, file=folder, remedy="name a new folder with --to")
 
     def without(where: str, names: list[str]) -> set[str]:
         here = Path(where)
@@ -93,32 +86,25 @@ def _copy_study(root: Path, out: Path, folder: Path) -> None:
         raise not_writable(folder, cause) from None
 
 
-def _corrected(unit: Unit, folder: Path) -> Outcome:
-    """One recording; as it was where nothing in it can be corrected."""
-    if (waiting := lacking(unit, BadDataError.exit_code)) is not None:
-        return waiting
-    path = folder / unit.own_trial.path.relative_to(unit.study.root)
-    try:
-        wrench = unit.path("wrench")
-        current = all(is_made_from(wrench, one) for one in unit.own_trial.files)
-        if not (current and is_made_from(unit.path("overall-diagnosis"), wrench)):
-            raise UsageError(
-                "has changed since it was read or diagnosed",
-                file=unit.own_trial.path,
-                remedy="run `bsip run` again",
-            )
-        correction = _Correction(unit)
-        said = [*correction.said]
-        if said:
-            rewrite = rewrite_c3d if path.suffix.lower() == ".c3d" else rewrite_trc_mot
-            head = f"bsip {__version__}: corrected by the diagnosis of {unit.study.root.name}, "
-            head += f"{unit.name}; before: sha256 {file_hash(unit.own_trial.path)}"
-            rewrite(unit.own_trial.path, path, correction.of, [head, *said])
-        left = [f"not corrected: {one}" for one in correction.left]
-        lines = [*(f"corrected: {one}" for one in said), *left] or ["nothing to correct"]
-    except BsipError as error:
-        return Outcome("export", unit.name, "refused", (f"{error}",), error.exit_code)
-    return Outcome("export", unit.name, "done", tuple(f"{unit.name}: {one}" for one in lines))
+def _corrected(unit: Unit, folder: Path) -> list[str]:
+    """One recording; as it was where nothing in it can be corrected. What is said of it."""
+    before, wrench = unit.own_trial.path, unit.path("wrench")
+    after = folder / before.relative_to(unit.study.root)
+    current = all(is_made_from(wrench, one) for one in unit.own_trial.files)
+    if not (current and is_made_from(unit.path("overall-diagnosis"), wrench)):
+        raise UsageError(
+            "has changed since it was read or diagnosed",
+            file=before,
+            remedy="run `bsip run` again",
+        )
+    correction = _Correction(unit)
+    if said := correction.said:
+        rewrite = rewrite_c3d if after.suffix.lower() == ".c3d" else rewrite_trc_mot
+        head = f"bsip {__version__}: corrected by the diagnosis of {unit.study.root.name}, "
+        head += f"{unit.name}; before: sha256 {file_hash(before)}"
+        rewrite(before, after, correction.of, [head, *said])
+    left = [f"not corrected: {one}" for one in correction.left]
+    return [*(f"corrected: {one}" for one in said), *left] or ["nothing to correct"]
 
 
 class _Correction:
@@ -141,16 +127,16 @@ class _Correction:
         self.causes: dict[Cause, str] = {}  # and what else it may be
         self._diagnosis = diagnosis = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in named.causes_here(unit, [*self._plates], [*self._zeros]):
-            words = named.called(cause.effect.name, cause.target)
-            alike = named.alike(cause, diagnosis)
+        for cause in causes_here(unit, [*self._plates], [*self._zeros]):
+            words = _called(cause.effect.name, cause.target)
+            alike = _look_alikes(cause, diagnosis)
             known |= {(cause.effect.name, cause.target), *alike}
-            others = " or ".join(named.called(*one) for one in alike)
+            others = " or ".join(_called(*one) for one in alike)
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
-            elif not named.is_corrected(cause.effect):
-                self.left.append(f"{words}: {named.why_left(cause.effect.name, '')}")
+            elif not is_corrected(cause.effect):
+                self.left.append(f"{words}: {why_left(cause.effect.name, '')}")
             elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
                 self.left.append(f"{words}: no plate shows where the axes are")
             elif alike and not all(
@@ -160,21 +146,21 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[self._as_diagnosed(cause)] = others
-        here = named.said_of(unit.name, diagnosis, [*EFFECTS])
+        here = _said_of(unit.name, diagnosis, [*EFFECTS])
         self.left += dict.fromkeys(
-            f"{named.called(*one)}: {named.why_left(one[0], 'its size is not known', group)}"
+            f"{_called(*one)}: {why_left(one[0], 'its size is not known', group)}"
             for *one, group in here[["effect", "target", "class_id"]].to_numpy()
             if tuple(one) not in known
         )
         # what is there and has no name, or acts like a fault but not evenly
         self.left += dict.fromkeys(
             f"{sentence}: its signal is not known exactly"
-            for sentence in named.said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
+            for sentence in _said_of(unit.name, diagnosis, [UNEXPLAINED])["sentence"]
         )
         verdicts = ("named", "ambiguous")
-        about = named.of_the_laboratory(unit, *verdicts) if self._plates else diagnosis[:0]
+        about = of_the_laboratory(unit, *verdicts) if self._plates else diagnosis[:0]
         self.left += dict.fromkeys(
-            f"{sentence}: {named.why_left(effect, 'no size of it is known for this recording')}"
+            f"{sentence}: {why_left(effect, 'no size of it is known for this recording')}"
             for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
             if (effect, target) not in known
             and target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
@@ -189,7 +175,7 @@ class _Correction:
     def _as_diagnosed(self, cause: Cause) -> Cause:
         """With the sizes that the diagnosis reports; of the laboratory those by all persons: for
         ``extend`` a person's own recordings are left out of them."""
-        found = named.rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
+        found = _rows_of(cause, self._diagnosis).set_index("parameter")["estimate"]
         names = [one.name for one in cause.effect.parameters(self._scene, cause.target)]
         if not found.index.is_unique or not {*names} <= {*found.index}:
             return cause
@@ -210,7 +196,7 @@ class _Correction:
             if is_noticed(zero):
                 force = ", ".join(f"{x:.1f}" for x in zero[:3])
                 said.append(f"plate {name}: its reading without load, ({force}) N, subtracted")
-        said += [named.words_of(*x, self._scene, self._diagnosis) for x in self.causes.items()]
+        said += [_size_words(*x, self._scene, self._diagnosis) for x in self.causes.items()]
         for a, b, start, stop in self._swaps:
             said.append(f"labels {a} and {b} exchanged from {start:.3f} to {stop:.3f} s")
         for n, end in ((cut.start, "beginning"), (last - cut.stop, "end")):
@@ -405,3 +391,68 @@ def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:
         if apart.min() < _SAME_M:
             return int(np.argmin(apart))
     raise BadDataError("its trajectory is not that of a point of the file", file=name)
+
+
+# --- what the diagnosis names in a recording, and what is said of it -----------------------------
+
+
+def _called(effect: str, target: str) -> str:
+    """A cause by the names of its effect and place, in the same ASCII as its numbers."""
+    if effect == UNEXPLAINED:
+        return "what acts like it and has no name"
+    return f"{effect} {target}".strip()
+
+
+def why_left(effect: str, unknown: str, group: str = "") -> str:
+    """Why what has no cause in the facts is not corrected. group : in which it is one of several;
+    unknown : what is said of a fault that could be corrected."""
+    if group:
+        return "one of several causes that look alike"
+    known = EFFECTS.get(effect)
+    if isinstance(known, FrameRate):
+        return "write the rate of the recording into the file, and run again"
+    can_be = known is not None and (is_corrected(known) or isinstance(known, MarkerSwap))
+    return unknown if can_be else NO_FAULT_OF_IT
+
+
+def _rows_of(cause: Cause, diagnosis: pd.DataFrame) -> pd.DataFrame:
+    """What the diagnosis says of a cause, a row for each number; what is known from the laboratory
+    may be rejected as this person's own."""
+    key = {"effect": cause.effect.name, "target": cause.target, "trials": ", ".join(cause.trials)}
+    is_it = (diagnosis[[*key]] == pd.Series(key)).all(axis=1)
+    return diagnosis[is_it & (diagnosis["verdict"] != "rejected")]
+
+
+def _look_alikes(cause: Cause, diagnosis: pd.DataFrame) -> list[tuple[str, str]]:
+    """Effects and targets that look like a cause in these recordings."""
+    groups = set(_rows_of(cause, diagnosis)["class_id"]) - {""}
+    is_it = (diagnosis["effect"] == cause.effect.name) & (diagnosis["target"] == cause.target)
+    others = diagnosis[diagnosis["class_id"].isin(groups) & ~is_it]
+    return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
+
+
+def _said_of(trial: str, diagnosis: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
+    """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
+    here = np.array([trial in names.split(", ") for names in diagnosis["trials"]], dtype=bool)
+    is_named = diagnosis["verdict"] != "rejected"
+    return diagnosis[here & diagnosis["effect"].isin(effects) & is_named]
+
+
+def _size_words(cause: Cause, others: str, scene: Scene, diagnosis: pd.DataFrame) -> str:
+    """``sync_offset: delay 11.9 ms (95 % interval 11.0 to 12.7) taken off``: in ASCII, which all
+    readers of C3D know."""
+    values, rows = [], _rows_of(cause, diagnosis)
+    for name, unit, value in cause.effect.reported(scene, cause.target, cause.values):
+        factor, readable = readable_unit(name, unit)
+        mine = rows[rows["parameter"] == name]  # two: the laboratory's, and the person's own
+        nearest = mine.iloc[(mine["estimate"] - value).abs().argsort()[:1]]
+        known = nearest[["ci_low", "ci_high"]].to_numpy() if len(mine) else _NO_INTERVAL
+        low, high = factor * known[0]
+        size, interval = f"{factor * value:.3g}", ""
+        if high > low:
+            size, *ends = (f"{x:.{digits_of(high - low)}f}" for x in (factor * value, low, high))
+            interval = f" (95 % interval {' to '.join(ends)})"
+        values.append(f"{name} {with_unit(size, readable)}{interval}")
+    alike = f" (as likely {others}, with the same sum of forces)" if others else ""
+    words = _called(cause.effect.name, cause.target)
+    return f"{words}: {', '.join(values)} taken off{alike}".replace("°", " deg")

@@ -23,7 +23,7 @@ from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of
 from bsip_cli.report.words import count, listing
-from bsip_cli.running.freshness import outdated
+from bsip_cli.running.runner import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
 

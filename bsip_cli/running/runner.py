@@ -7,20 +7,26 @@ import hashlib
 import signal
 import time
 import traceback
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pandas as pd
 
 from bsip_cli import errors
-from bsip_cli.artifacts import remove, remove_unfinished, write_artifact, write_bytes
+from bsip_cli.artifacts import (
+    read_artifact,
+    read_header,
+    remove,
+    remove_unfinished,
+    write_artifact,
+    write_bytes,
+)
 from bsip_cli.config import Config
 from bsip_cli.files import fingerprints
-from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer
-from bsip_cli.running.freshness import stale_upstream, units_of, was_changed, why_stale
+from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer, upstream
 from bsip_cli.running.processes import Died, end_if_asked, work_on
 from bsip_cli.running.unit import Unit, code_hash, library_versions
 from bsip_cli.schemas import SCHEMAS
@@ -28,6 +34,7 @@ from bsip_cli.study.study import Participant, Study
 from bsip_cli.study.trials import listed
 
 LOCK = ".lock"
+_MOVED = "what all persons together show has moved"
 _SHORT_OF_MEMORY = "the process was killed (out of memory?); run again, with fewer --jobs"
 
 State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug", "noted"]
@@ -294,6 +301,165 @@ def lacking(unit: Unit, refused_code: int = 0) -> Outcome | None:
         first, code = producer(gone[0]).name, 2
         why = f"{stage} has no {', '.join(gone)} to read; run `bsip {first}` first"
     return Outcome(stage, unit.name, "waiting", (f"{unit.name}: {why}",), code)
+
+
+def attempt(unit: Unit, work: Callable[[], Iterable[str]]) -> Outcome:
+    """Do for a unit what is no stage; ``work`` gives what to say of it, after its messages."""
+    if (waiting := lacking(unit, errors.BadDataError.exit_code)) is not None:
+        return waiting
+    try:
+        said = [f"{unit.name}: {one}" for one in work()]
+    except errors.BsipError as error:
+        said = [*unit.messages, str(error)]
+        return Outcome(unit.stage.name, unit.name, "refused", tuple(said), error.exit_code)
+    return Outcome(unit.stage.name, unit.name, "done", (*unit.messages, *said))
+
+
+# --- whether results are still true: by this code and these options, from what is there now -------
+
+
+def why_stale(unit: Unit) -> str:
+    """Why a unit has work to do, as a clause; empty if all that it writes is there and true.
+
+    BadDataError: a file that it reads cannot be read.
+    """
+    if unit.refusal_path().exists():
+        return "it was refused before"
+    for kind in unit.stage.writes:
+        if why := _why_not(unit, kind, "made_by"):
+            return why
+        if names := _changed_files(unit, kind):  # next to the artifact: pages, figures, tables
+            return f"{names[0]} has changed since bsip wrote it"
+    amended = (_why_not(unit, kind, "amended_by") for kind in unit.stage.amends)
+    return next(filter(None, amended), "")
+
+
+def was_changed(unit: Unit) -> list[str]:
+    """Files that the unit has written and that are no more what it wrote, as clauses."""
+    found = []
+    for kind in unit.stage.writes:
+        path = unit.path(kind)
+        if not path.is_file():  # a folder in its place is reported when it is to be written
+            continue
+        try:
+            read_header(path, kind)
+        except errors.BadDataError as error:
+            if not fingerprints.fingerprint(path).intact:  # else it is of another version of bsip
+                found.append(f"{path.name} {error.found}")
+            continue
+        names = (name for name in _changed_files(unit, kind) if (unit.out / name).exists())
+        found += [f"{name} has changed since bsip wrote it" for name in names]
+    return found
+
+
+def stale_upstream(unit: Unit, participant: Participant | None, stages: Collection[Stage]) -> str:
+    """The first result of a participant, or of the group, on which ``stages`` build and that is no
+    more true, and why; empty if all are."""
+    own, of_group = {stage.label for stage in stages}, participant is None
+    whole = unit.study, unit.out, unit.config_of_all, participant, unit.left_out
+    for stage in upstream(stages, lambda one: one.inputs):
+        if stage.label in own or (stage.level == "cohort") != of_group:
+            continue
+        for other in units_of(stage, *whole):
+            refusal, kinds = other.refusal_path(), other.stage.writes
+            if refusal.exists():  # what was refused as it stands, or is not there, is no lie
+                made_by = read_header(refusal, "refusal")["provenance"]["made_by"]
+                why = _differs(made_by, other.made_by)
+            else:
+                there = not other.missing() and any(other.path(kind).exists() for kind in kinds)
+                why = why_stale(other) if there else ""
+            if why and why != _MOVED:  # such a person counts in the group all the same
+                return f"what `bsip {stage.name}` made of {other.name} is not up to date ({why})"
+    return ""
+
+
+def units_of(
+    stage: Stage,
+    study: Study,
+    out: Path,
+    config: Config,
+    participant: Participant | None,
+    left_out: Mapping[str, str],
+) -> Iterator[Unit]:
+    """A stage's units about a participant, or the group."""
+    trials = participant.trials if participant and stage.level == "trial" else (None,)
+    for trial in trials:
+        yield Unit(stage, study, out, config, participant, trial, left_out=left_out)
+
+
+def _why_not(unit: Unit, kind: str, maker: str) -> str:
+    path = unit.path(kind)
+    if not path.exists():
+        return f"{path.name} is not there"
+    try:
+        provenance = read_header(path, kind)["provenance"]
+    except errors.BadDataError as error:
+        return f"{path.name} {error.found}"
+    return _differs(provenance.get(maker), unit.made_by)
+
+
+def _differs(known: Mapping[str, Any] | None, wanted: Mapping[str, Any]) -> str:
+    """What two provenances do not have in common, as a clause."""
+    if known == wanted:
+        return ""
+    if known is None:
+        return "nothing was added to it yet"
+    words = {
+        "code": "the code or a shipped table has changed",
+        "bsip_version": "the version of bsip has changed",
+        "libraries": "the version of a library has changed",
+    }
+    for part, sentence in words.items():
+        if known.get(part) != wanted[part]:
+            return sentence
+    options = _names(known["options"], wanted["options"])
+    if options:
+        return f"other options ({', '.join(options)})"
+    inputs = _names(known["inputs"], wanted["inputs"])
+    if all(name.endswith(" of the group") for name in inputs):
+        return _MOVED
+    return f"other input ({', '.join(inputs[:3])})"
+
+
+def _names(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
+
+
+def _changed_files(unit: Unit, kind: str) -> list[str]:
+    if SCHEMAS[kind].column("sha256") is None:
+        return []
+    listed = read_artifact(unit.path(kind), kind)
+    return [
+        name
+        for name, known in zip(listed["file"], listed["sha256"], strict=True)
+        if not (path := unit.out / name).is_file() or fingerprints.file_hash(path) != known
+    ]
+
+
+def outdated(path: Path) -> str:
+    """Why an artifact is no more true as far as the folder of results shows, without the study.
+
+    Its code has changed, or an artifact that it was made from, or one that that was made from.
+
+    BadDataError: it is missing, is no artifact or has changed since it was written.
+    """
+    waiting, seen = [path], set()
+    while waiting:
+        one = waiting.pop()
+        header = read_header(one)
+        made_by = header["provenance"]["made_by"]
+        makers = [stage for stage in STAGES if header["kind"] in stage.writes]
+        if made_by.get("code") != (code_hash(makers[0].module) if makers else ""):
+            return f"{one.name} was made by other code"
+        for name, known in made_by["inputs"].items():
+            source = one.with_name(name)
+            if source.suffix != ".parquet" or source.name in seen:
+                continue
+            if not source.exists() or fingerprints.file_hash(source) != known:
+                return f"{one.name} was made from another {name}"
+            seen.add(source.name)
+            waiting.append(source)
+    return ""
 
 
 # --- only one program at a time writes into a folder of results -------------------------------

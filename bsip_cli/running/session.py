@@ -34,7 +34,7 @@ _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 def run_session(
     command: str,
-    root: Path,
+    study: Path,
     out: Path,
     chosen: tuple[str, ...],
     config_file: Path | None,
@@ -56,7 +56,7 @@ def run_session(
     stages = _stages(command, chosen, group, until)
     if any(stage.level == "cohort" for stage in stages):
         chosen = ()  # what is about all needs all
-    opened = open_study(root, out, chosen, config_file, estimators)
+    opened = open_study(study, out, chosen, config_file, estimators)
     notes = [describe_dataset(out, opened.study.root)]
     if not chosen:
         notes.append(_left_behind(out, opened.study))

@@ -343,7 +343,7 @@ def code_hash(module: str) -> str:
     modules = imported_by(module)
     digest = hashlib.sha256()
     for name in sorted(modules):
-        digest.update(f"{name}\n{_source(name)}".encode())
+        digest.update(f"{name}\n{_sources()[name]}".encode())
     for file in sorted(_data_of(modules)):
         digest.update(f"{file.name}\n".encode() + file.read_bytes())
     return digest.hexdigest()
@@ -355,41 +355,37 @@ def imported_by(module: str) -> frozenset[str]:
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name and name not in found and _source(name) is not None:
+        if name in _sources() and name not in found:
             found.add(name)
             waiting += [name.rpartition(".")[0], *_named_in(name)]
     return frozenset(found)
 
 
+@lru_cache(maxsize=1)
+def _sources() -> dict[str, str]:
+    """The text of every module of the package, by its dotted name."""
+    files = {file.relative_to(_PACKAGE.parent): file for file in _PACKAGE.rglob("*.py")}
+    named = {".".join(place.with_suffix("").parts): file for place, file in files.items()}
+    texts = {name: file.read_text(encoding="utf-8") for name, file in named.items()}
+    return {name.removesuffix(".__init__"): text for name, text in texts.items()}
+
+
 @lru_cache(maxsize=1024)
 def _named_in(module: str) -> frozenset[str]:
-    text = _source(module) or ""
+    text = _sources()[module]
     named = set(_IMPORT.findall(text))
     for package, names in _FROM.findall(text):
         words = re.findall(r"\w+", re.sub(r"#.*", "", names))
         named |= {package, *(f"{package}.{word}" for word in words)}
-    for package in _CHOSEN_LATER.findall(text):
-        named |= {f"{package}.{file.stem}" for file in _place_of(package).glob("*.py")}
-    return frozenset(named)
-
-
-def _place_of(module: str) -> Path:
-    """Its folder, if it is a package."""
-    return _PACKAGE.joinpath(*module.split(".")[1:])
-
-
-@lru_cache(maxsize=1024)
-def _source(module: str) -> str | None:
-    place = _place_of(module)
-    files = (file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file())
-    return next((file.read_text(encoding="utf-8") for file in files), None)
+    later = {*_CHOSEN_LATER.findall(text)}
+    return frozenset(named | {name for name in _sources() if name.rpartition(".")[0] in later})
 
 
 def _data_of(modules: frozenset[str]) -> set[Path]:
     """Files that are no code: those named in ``configs/``, and those in the modules' packages."""
-    named = {name for module in modules for name in _SHIPPED.findall(_source(module) or "")}
-    folders = {_place_of(module.rpartition(".")[0]) for module in modules if "." in module}
-    folders -= {_PACKAGE}
+    named = {name for module in modules for name in _SHIPPED.findall(_sources()[module])}
+    folders = {_PACKAGE.parent.joinpath(*module.split(".")[:-1]) for module in modules}
+    folders -= {_PACKAGE, _PACKAGE.parent}
     inside = (file for folder in folders for file in _below(folder))
     package_of = {f: next(p for p in f.parents if (p / "__init__.py").is_file()) for f in inside}
     own = {file for file, package in package_of.items() if package in folders}

@@ -54,7 +54,10 @@ def run(unit: Unit) -> None:
     is_rare = bool(identification.loc[OM, "rare"])
     movements = dict.fromkeys(judge.trial.task for judge in judges)
     by_movement = {one: [judge for judge in judges if judge.trial.task == one] for one in movements}
-    of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
+    of_each = {
+        movement: {pair: _difference(pair, trials) for pair in choice.PAIRS}
+        for movement, trials in by_movement.items()
+    }
     # every movement counts once; of a single one, as far as its own trials show
     over_all = next(iter(of_each.values()), _UNKNOWN)
     if len(of_each) > 1:
@@ -173,13 +176,7 @@ def _within(
     return choice.within(first, second)
 
 
-# --- differences ------------------------------------------------------------------------------
-
-
-def _differences(judges: list[Judge]) -> choice.Differences:
+def _difference(pair: choice.Pair, judges: list[Judge]) -> choice.Difference:
     if len(judges) == 1:
-        return {pair: judges[0].alone(pair) for pair in choice.PAIRS}
-    return {
-        (a, b): choice.between([judge.log_error[a] - judge.log_error[b] for judge in judges])
-        for a, b in choice.PAIRS
-    }
+        return judges[0].alone(pair)
+    return choice.between([one.log_error[pair[0]] - one.log_error[pair[1]] for one in judges])

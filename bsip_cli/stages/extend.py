@@ -16,7 +16,6 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import (
-    Blocks,
     Cause,
     change_by,
     corrected_wrench,
@@ -24,7 +23,6 @@ from bsip_cli.diagnosis.cause import (
     unseen_change_by,
 )
 from bsip_cli.effects.joints import AXES, MissingJoint, split_torso
-from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence, gain_sentence
@@ -171,9 +169,14 @@ def run_trial(unit: Unit) -> None:
     rows = reconstruct.reconstruction_rows(judgement, {name: signals[name] for name in ours})
     unit.amend("reconstruction", rows)
     alike = reconstruct.over_the_same_frames(signals, judgement.judged)
-    compared = {name: alike[name] for name in (MEASURED, *ours)}
-    unit.amend("fit", reconstruct.fit_rows(judgement, compared))
-    errors = _errors(judgement, signals, ours[-1], blocks)
+    alike = {name: alike[name] for name in (MEASURED, *ours)}
+    unit.amend("fit", reconstruct.fit_rows(judgement, alike))
+    numbers, errors = blocks.of(scene.times_s)[judgement.judged], {}
+    for component in signals[MEASURED]:
+        scale, _ = reconstruct.scale_of(component)
+        of_all = (scale * signals[name][component] for name in (MEASURED, OM, ours[-1]))
+        compared, before, after = (one[judgement.judged] for one in of_all)
+        errors[component] = block_errors(compared, before, after, numbers)
     known = ours[-1], _held_out(unit, judgement), crc32(unit.name.encode())
     rows = reconstruct.gain_rows(errors, *known)
     sums = {  # per block, for the gain over all trials
@@ -181,20 +184,13 @@ def run_trial(unit: Unit) -> None:
         for component, one in errors.items()
     }
     unit.write("gain", rows, facts={"method": ours[-1], "data": judgement.data, "blocks": sums})
-    unit.write("corrected-wrench", _corrected(scene, measured, causes))
-
-
-def _errors(
-    judgement: reconstruct.Judgement, signals: reconstruct.Signals, method: str, blocks: Blocks
-) -> dict[str, BlockErrors]:
-    judged, errors = judgement.judged, {}
-    numbers = blocks.of(judgement.times_s)[judged]
-    for component in signals[MEASURED]:
-        scale, _ = reconstruct.scale_of(component)
-        compared = (scale * signals[name][component][judged] for name in (MEASURED, OM, method))
-        measured, before, after = compared
-        errors[component] = block_errors(measured, before, after, numbers)
-    return errors
+    corrected = empty_table("corrected-wrench")
+    if any(cause.effect.of_the_forces for cause in causes):
+        of_the_plates = replace(scene, valid=measured["valid"].to_numpy())
+        wrench, valid = corrected_wrench(of_the_plates, raw[MEASURED], causes)
+        freed = {"time_s": scene.times_s} | columns(WRENCH, wrench) | {"valid": valid}
+        corrected = pd.DataFrame(freed)
+    unit.write("corrected-wrench", corrected)
 
 
 def _held_out(unit: Unit, judgement: reconstruct.Judgement) -> str:
@@ -207,17 +203,6 @@ def _held_out(unit: Unit, judgement: reconstruct.Judgement) -> str:
     elif judgement.used.any():
         by = "the judged seconds were held out of the identification, others of the trial not"
     return f"{judgement.data}: {sizes}; {by}"
-
-
-# --- forces without their errors --------------------------------------------------------------
-
-
-def _corrected(scene: Scene, measured: pd.DataFrame, causes: list[Cause]) -> pd.DataFrame:
-    if not any(cause.effect.of_the_forces for cause in causes):
-        return empty_table("corrected-wrench")
-    of_the_plates = replace(scene, valid=measured["valid"].to_numpy())
-    wrench, valid = corrected_wrench(of_the_plates, measured[WRENCH].to_numpy(), causes)
-    return pd.DataFrame({"time_s": scene.times_s} | columns(WRENCH, wrench) | {"valid": valid})
 
 
 # --- the gain over all trials ---------------------------------------------------------------------

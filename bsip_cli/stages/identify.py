@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.identification import uncertainty
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.movement_gain import advice
-from bsip_cli.identification.problem import Estimate, Problem, Recording
+from bsip_cli.identification.problem import Estimate, Problem
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names, spread_names
 from bsip_cli.segments import in_words as segment_in_words
@@ -61,9 +60,17 @@ def run(unit: Unit) -> None:
         known = load_words(unit, trial) if trial.stem in set(blocks["trial"]) else ""
         if known:
             unit.say(f"taken off the forces of {trial.stem} as a known load: {known}")
-    if duration_s(recordings) < _SHORTEST_S:
-        _write_table_only(unit, regression, recordings, facts)
-        unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
+    table, roots = regression.drop(columns=["note", *spread_names()]), {RM: prior.root}
+    if (seconds := duration_s(recordings)) < _SHORTEST_S:
+        unit.say(
+            f"{seconds:.2f} s of motion with every contact on a plate, needed are {_SHORTEST_S:g} "
+            "s: nothing is identified, the table (RM) stands alone"
+        )
+        unit.write("bsip", table)
+        unit.write("covariance", _covariance_table(skeleton, roots))
+        for kind in ("base-parameters", "excitation", "used-blocks"):
+            unit.write(kind, ())
+        unit.write("identification", (), facts)
         return
     lost = person.without_data()[list(skeleton.bodies)]
     fixed = [name for name, is_lost in zip(skeleton.body_names, lost, strict=True) if is_lost]
@@ -78,7 +85,7 @@ def run(unit: Unit) -> None:
     estimators = {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
     estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
     shares: dict[str, np.ndarray] = {}
-    tables, roots = [regression.drop(columns=["note", *spread_names()])], {RM: prior.root}
+    tables = [table]
     for method, estimate in estimates.items():
         unit.say(f"{method}: {estimate.note}")
         roots[method] = uncertainty.root_of(estimate.covariance)
@@ -108,19 +115,6 @@ def run(unit: Unit) -> None:
     ]
     unit.write("identification", summary, facts)
     unit.write("used-blocks", blocks)
-
-
-def _write_table_only(
-    unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict[str, Any]
-) -> None:
-    unit.say(
-        f"{duration_s(recordings):.2f} s of motion with every contact on a plate, "
-        f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
-    )
-    unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
-    for kind in ("base-parameters", "excitation", "used-blocks"):
-        unit.write(kind, ())
-    unit.write("identification", (), facts)
 
 
 # --- which data -------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from shlex import quote
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import momentum_mass
 from bsip_cli.recordings.c3d_person import against_table
@@ -44,8 +44,14 @@ def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     session = reading_of(unit.read("readings"), unit.facts("readings"), unit.own_trial)
     recording = assemble(opened(unit, unit.own_trial, session.written, session.gains()), session)
-    marker_set, about_set = _marker_set(unit, recording)
     prefix, seen = prefix_of(unit), np.isfinite(recording.markers_m[..., 0]).any(axis=0)
+    about_set: tuple[Finding, ...] = ()
+    if unit.config.marker_set == "auto":
+        source = quote(str(unit.own_trial.path))
+        guess = guess_marker_set(recording.labels, prefix, source)
+        marker_set, about_set = guess.marker_set, guess.findings()
+    else:
+        marker_set = load_marker_set(unit.config.marker_set)
     seen_as = recording.labels, recording.markers_m
     marker_set, placed = with_numbers_placed(*seen_as, marker_set, prefix)
     labels, paired = with_pairs_named(*seen_as, marker_set, prefix)
@@ -101,15 +107,6 @@ def run(unit: Unit) -> None:
     unit.write("contacts", _contact_table(times, contacts))
     used = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
-
-
-def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:
-    """The set that is configured, or recognised from the labels, and how."""
-    if unit.config.marker_set != "auto":
-        return load_marker_set(unit.config.marker_set), ()
-    source = quote(str(unit.own_trial.path))
-    guess = guess_marker_set(recording.labels, prefix_of(unit), source)
-    return guess.marker_set, guess.findings()
 
 
 def _require(unit: Unit, names: list[str], recording: Recording) -> None:

@@ -65,7 +65,12 @@ def run(unit: Unit) -> None:
     spread = _spreads(unit, person, methods)
     feet, on_feet = trial.ground(trial.readings)
     reasons = _reasons(unit, trial, feet)
-    left_out = _report(unit, trial, reasons)
+    counts = {words: out.sum(axis=0).tolist() for words, out in reasons.items()}
+    _report(unit, trial, counts)
+    left_out = {
+        joint: "; ".join(f"{words}: {n[j]} frames" for words, n in counts.items() if n[j])
+        for j, joint in enumerate(person.skeleton.joints[1:])
+    }
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
     loads = trial.loads(phi + known, on_feet, spread)
@@ -185,11 +190,9 @@ def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
             yield cause.target, np.abs(trial.times_s - middle) <= length / 2
 
 
-def _report(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
-    """Say what is left out: joints of one reason and number of frames together; by joint, what left
-    frames out, in words, empty where nothing did."""
+def _report(unit: Unit, trial: _Trial, counts: Mapping[str, Sequence[int]]) -> None:
+    """Say what is left out: joints of one reason and number of frames together."""
     joints, parts = trial.person.skeleton.joints[1:], []
-    counts = {words: out.sum(axis=0).tolist() for words, out in reasons.items()}
     for words, of_joints in counts.items():
         for frames in sorted(set(of_joints) - {0}, reverse=True):
             alike = [in_words(j) for j, n in zip(joints, of_joints, strict=True) if n == frames]
@@ -198,10 +201,6 @@ def _report(unit: Unit, trial: _Trial, reasons: Reasons) -> dict[str, str]:
     if parts:
         count = len(trial.times_s)
         unit.say(f"joint moments left out of {count} frames: {'; '.join(parts)}")
-    return {
-        joint: "; ".join(f"{words}: {n[j]} frames" for words, n in counts.items() if n[j])
-        for j, joint in enumerate(joints)
-    }
 
 
 def _legs(joints: list[str]) -> list[str]:

@@ -188,6 +188,15 @@ def information_in(rows: pd.DataFrame) -> Information:
     )
 
 
+def session_rows(session: str, information: Information) -> Iterator[dict[str, object]]:
+    """Of ``laboratory-information``, one for each number of a fault."""
+    numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
+    for k, (one, parameter, trials) in enumerate(numbers):
+        row = {"session": session, **vars(one), "trials": int(trials), "pull": information.pull[k]}
+        row |= {name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")}
+        yield row | {f"precision_{j}": x for j, x in enumerate(information.precision[k])}
+
+
 def pooled_in(rows: pd.DataFrame) -> Pooled:
     """Of one laboratory's rows of ``laboratory-sums``."""
     roots = rows.filter(regex=r"^root_").dropna(axis=1)

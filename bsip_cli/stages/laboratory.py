@@ -29,7 +29,7 @@ from bsip_cli.report.words import count
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, prior_of, stated_sd
 from bsip_cli.stages.frames import person_of
-from bsip_cli.stages.known_laboratory import information_in, pooled_rows
+from bsip_cli.stages.known_laboratory import information_in, pooled_rows, session_rows
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
@@ -58,7 +58,8 @@ def run_person(unit: Unit) -> None:
             scene = inner(scene)
         if scene.valid.any():
             seen.setdefault(trial.session or "", []).append((trial, scene))
-    rows, sessions = [], {}
+    rows: list[dict[str, object]] = []
+    sessions = {}
     for session, mine in seen.items():
         found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
         usable = [one for one in found if one is not None and one.held is None]
@@ -66,7 +67,7 @@ def run_person(unit: Unit) -> None:
             scenes = [one.scene for one in usable if one.moves]
             moments = np.concatenate([one.times_s[one.valid] - one.times_s[0] for one in scenes])
             trials, standing = [x.errors for x in usable], [not x.moves for x in usable]
-            rows += _session_rows(session, information_of(trials, standing))
+            rows += session_rows(session, information_of(trials, standing))
             sessions[session] = {
                 "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
                 "trials": [one.trial.stem for one in usable],
@@ -78,16 +79,6 @@ def run_person(unit: Unit) -> None:
         unit.say(f"{why}; it shows nothing of the laboratory")
     facts = {"sessions": sessions, "mass_sd": stated_sd(unit)}
     unit.write("laboratory-information", rows, facts)
-
-
-def _session_rows(session: str, information: Information) -> list[dict[str, object]]:
-    numbers = zip(information.coordinates, information.parameters, information.trials, strict=True)
-    rows: list[dict[str, object]] = []
-    for k, (one, parameter, trials) in enumerate(numbers):
-        row = {"session": session, **vars(one), "trials": int(trials), "pull": information.pull[k]}
-        row |= {name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")}
-        rows.append(row | {f"precision_{j}": x for j, x in enumerate(information.precision[k])})
-    return rows
 
 
 # --- all together ---------------------------------------------------------------------------------

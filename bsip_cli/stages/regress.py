@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.anthropometry import regress, strays_of
-from bsip_cli.body.inertia import Inertia, rod_length_m
-from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.body.inertia import rod_length_m
 from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.running.unit import Unit
@@ -32,19 +31,15 @@ def run(unit: Unit) -> None:
     if strays.outside:
         unit.say(strays.outside)
     com = np.where(np.isnan(strays.com), unit.config.prior.com_sd_percent, strays.com)
-    com = np.hypot(com, _lengths_err(unit, skeleton, result.inertias))
+    # centres of mass err by the same part as lengths do, after refinement, or of the first guess
+    # where a length is not refined [% of the rod's length]
+    lengths = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
+    part = (lengths["length_sd_m"] / lengths["length_m"]).fillna(unit.config.scale.length_sd)
+    centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in result.inertias])
+    com = np.hypot(com, 100 * part.to_numpy()[:, None] * centres)
     spreads = np.column_stack([strays.mass, com, strays.moments])
     prior = prior_of(result.inertias, person, spread_from(unit, spreads))
     values = np.array([inertia.readable() for inertia in prior.inertias])
     table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))
     table[list(spread_names())] = spreads
     unit.write("regression", table.assign(note=list(result.notes)))
-
-
-def _lengths_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
-    """(n, 3) by how much [% of the rod's length] centres of mass err because lengths do: by the
-    same part, after refinement, or of the first guess where a length is not refined."""
-    rows = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
-    part = (rows["length_sd_m"] / rows["length_m"]).fillna(unit.config.scale.length_sd)
-    centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in inertias])
-    return 100 * part.to_numpy()[:, None] * centres

@@ -38,21 +38,27 @@ class _Recorded:
 
 def run(unit: Unit) -> None:
     """Read all trials' markers; write skeleton, marker-positions and person."""
-    skeleton = load_skeleton(unit.config.skeleton)
+    skeleton, configured = load_skeleton(unit.config.skeleton), unit.config.marker_set
     recorded = [
         _Recorded(trial, *markers_from(unit.read("markers", trial)))
         for trial in unit.trials("markers", "wrench")
     ]
     still = _calibrating_trial(unit, recorded)
     _, quiet = _unrest(still)
-    marker_set = _marker_set(unit, still.trial)
+    if configured == "auto":  # what ingest recognised from the trial's labels
+        content = unit.facts("markers", still.trial)["marker_set_content"]
+        marker_set = MarkerSet.from_data(content)
+    else:
+        marker_set = load_marker_set(configured)
     sex, height_m = unit.person.sex, _height_m(unit, recorded)
     tracks = [dict(zip(x.labels, x.positions.swapaxes(0, 1), strict=True)) for x in recorded]
-    standing = _mean_positions(still, quiet)
+    quietly = {label: track[quiet] for label, track in tracks[recorded.index(still)].items()}
+    seen = {label: track[np.isfinite(track[:, 0])] for label, track in quietly.items()}
+    standing = {label: places.mean(axis=0) for label, places in seen.items() if len(places)}
     calibration = calibrate(skeleton, marker_set, standing, sex, height_m, tracks)
     _require_markers(unit, marker_set, calibration.person)
     mass = person_mass(unit, [one.trial for one in recorded], calibration.stature_m)
-    if unit.config.marker_set == "auto":
+    if configured == "auto":
         unit.say(f"marker set {marker_set.name}, recognised by the labels")
         _warn_strangers(unit, marker_set, recorded)
     for note in calibration.notes:
@@ -116,14 +122,6 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
         )
 
 
-def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
-    """As configured; what ingest recognised from the trial's labels where that was left to it."""
-    configured = unit.config.marker_set
-    if configured != "auto":
-        return load_marker_set(configured)
-    return MarkerSet.from_data(unit.facts("markers", trial)["marker_set_content"])
-
-
 def _warn_strangers(unit: Unit, marker_set: MarkerSet, recorded: list[_Recorded]) -> None:
     known = {marker.label for marker in marker_set.markers}
     for one in recorded:
@@ -170,12 +168,6 @@ def _unrest(one: _Recorded) -> tuple[float, slice]:
     windows[shown < _NEARLY_ALL * shown.max()] = np.inf
     start = int(np.argmin(windows))
     return float(windows[start]), slice(start, start + width)
-
-
-def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
-    tracks = zip(one.labels, one.positions[frames].swapaxes(0, 1), strict=True)
-    seen = {label: track[np.isfinite(track[:, 0])] for label, track in tracks}
-    return {label: places.mean(axis=0) for label, places in seen.items() if len(places)}
 
 
 # --- the fit ----------------------------------------------------------------------------------

@@ -62,7 +62,12 @@ def run(unit: Unit) -> None:
         if heights and (fault := no_person(max(heights), unit.person.height_m)):
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
-        _say_height(unit, seen)
+        # where the height that participants.tsv states, or else a recording, is not the markers'
+        in_files = (one.stated_height_m for one in seen if one.stated_height_m is not None)
+        stated_m = unit.person.height_m or next(in_files, None)
+        usual = Stature.of_all([one.stature for one in seen])
+        if stated_m is not None and usual is not None and (wrong := usual.against(stated_m)):
+            unit.say(Finding("stated_person", "", *wrong, "warning").sentence())
         if said := other_bodies({one.name: one.sizes for one in seen}):
             unit.say(said)
         stated = unit.person.mass_kg, unit.person.height_m, options.mass_gross_percent
@@ -85,16 +90,6 @@ def run(unit: Unit) -> None:
             f"recording exported twice, or one has the other's forces; {_NO_TEST}"
         )
     unit.write("readings", rows, facts | written)
-
-
-def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
-    """Where the height that participants.tsv states, or else a recording, is not the markers'."""
-    in_files = (one.stated_height_m for one in seen if one.stated_height_m is not None)
-    stated_m = unit.person.height_m or next(in_files, None)
-    usual = Stature.of_all([one.stature for one in seen])
-    if stated_m is not None and usual is not None and (fault := usual.against(stated_m)):
-        about = Finding("stated_person", "", *fault, "warning")
-        unit.say(about.sentence())
 
 
 def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict[str, float]:

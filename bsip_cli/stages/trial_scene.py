@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
+from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
 from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.frames import Turned
+from bsip_cli.effects.plates import ALL, PlateZero
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.inverse_kinematics import posed
 from bsip_cli.recordings.plate_wrench import silent_frames
@@ -104,6 +108,57 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
     keys = [(EFFECTS[one["effect"]], one["target"], tuple(one["trials"])) for one in causes]
     sizes = [(np.array(one["values"]), np.array(one["folds"])) for one in causes]
     return tuple(Cause(*key, *both) for key, both in zip(keys, sizes, strict=True))
+
+
+def is_corrected(effect: Effect) -> bool:
+    """Of the plates, the clocks, or the axes of laboratory and cameras."""
+    return effect.of_the_forces or isinstance(effect, Turned)
+
+
+def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -> list[Cause]:
+    """What the diagnosis names in a recording, on the plates that it has.
+
+    Where it did not look at it: what it names of the instruments in all others of the session, at
+    least two, and what the laboratory of the person is known to have, but for offsets of plates
+    whose zero this recording shows (``zeroed``).
+    """
+    analysed, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
+    here = [one for one in causes if unit.name in one.trials]
+    if unit.name in analysed:
+        return here
+    session = {t.stem for t in unit.person.trials if t.session == unit.own_trial.session}
+    others = session & set(analysed)
+    shared = [
+        one
+        for one in causes
+        if one.effect.is_of_laboratory and is_corrected(one.effect) and others <= set(one.trials)
+    ]
+    shared = shared if len(others) > 1 else []
+    known = {(one.effect.name, one.target) for one in shared}
+    named = of_the_laboratory(unit, "named")
+    named = named[named["scope"] == "laboratory"]
+    for (effect, target), sizes in named.groupby(["effect", "target"], sort=False):
+        if (effect, target) not in known:
+            values = sizes["estimate"].to_numpy()
+            cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
+            shared.append(cause)
+    for one in shared:
+        gone = zeroed if isinstance(one.effect, PlateZero) else ()
+        if one.target.split(" ")[0] in {"", ALL, *plates} - {*gone}:
+            here.append(one)
+    return here
+
+
+def of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
+    """Rows about the laboratory of a person who was in one only, with others, or about this
+    session in it."""
+    of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
+    mine = [number for number, persons in of_all if {unit.person.id} < {*persons}]
+    if len(mine) != 1:  # alone the person's own diagnosis, which asks more of it, is the answer
+        return empty_table("laboratory")
+    rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
+    session = "_ses-".join(filter(None, (unit.person.id, unit.own_trial.session)))
+    return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
 def cause_record(

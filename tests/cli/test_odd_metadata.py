@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli.artifacts import read_artifact, read_header
-from bsip_cli.commands.info import artifact_info
+from bsip_cli.commands.look import info
 from bsip_cli.errors import BadDataError
 
 MADE_BY = {
@@ -62,7 +62,7 @@ def test_metadata_of_another_shape(tmp_path, case):
         with pytest.raises(BadDataError, match="is not an artifact of bsip"):
             read(path)
     with pytest.raises(BadDataError, match="is not an artifact of bsip"):
-        list(artifact_info(path))
+        list(info(path))
 
 
 @pytest.mark.parametrize("made_by", [MADE_BY, {}])
@@ -70,7 +70,7 @@ def test_foreign_texts_are_shown_in_their_line(tmp_path, monkeypatch, made_by):
     provenance = PROVENANCE | {"made_by": made_by, "messages": ["a\nforged"]}
     path = write(tmp_path / "a.parquet", HEADER | {"provenance": provenance})
     monkeypatch.setattr("bsip_cli.artifacts._check_intact", lambda _: None)
-    lines = list(artifact_info(path))
+    lines = list(info(path))
     assert "warning   a?forged" in lines
     assert not [line for line in lines if "\n" in line]
 

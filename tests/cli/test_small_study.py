@@ -21,8 +21,7 @@ from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.config import load_config
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.running.freshness import why_stale
-from bsip_cli.running.runner import held_alone, perform
+from bsip_cli.running.runner import held_alone, perform, why_stale
 from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnosed_trials import prior_of, weighed

@@ -409,7 +409,7 @@ def test_decimal_commas_between_commas_are_refused_with_the_reason(empty_study):
 
 def test_names_for_scripts_are_those_of_the_folders(empty_study):
     (empty_study / "participants.tsv").write_text("id;sex;mass\n1;F;70\nsub-02;M;80\n")
-    assert named_in(empty_study / "participants.tsv") == ["sub-01", "sub-02"]
+    assert named_in(empty_study) == ["sub-01", "sub-02"]
     study, _ = load_study(empty_study, ROLES, ["sub-01"])
     assert [person.mass_kg for person in study.participants] == [70.0]
 

@@ -19,8 +19,8 @@ from scipy.ndimage import uniform_filter1d
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
-from bsip_cli.commands.export import Request, export_session
-from bsip_cli.commands.named_causes import causes_here, why_left
+from bsip_cli.commands.export import export_session
+from bsip_cli.commands.export_recording import why_left
 from bsip_cli.effects.effect import Number
 from bsip_cli.instruments.c3d_file import wired_plates
 from bsip_cli.recordings.model import Recording
@@ -30,6 +30,7 @@ from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.study import inject_study, simulate_study
 from bsip_cli.stages.diagnose import nothing, rows_of
+from bsip_cli.stages.trial_scene import causes_here
 from tests.exports.test_export_command import NOTES, Results, write_person
 from tests.small_study import small
 
@@ -101,8 +102,8 @@ class Study:
 
     def exported(self, code: int = 0) -> Path:
         to = self.made.study.with_name("corrected")
-        request = Request(what="recording", to=to)
-        assert export_session(self.made.study, self.made.out, (), None, request) == code
+        asked = {"what": "recording", "to": to}
+        assert export_session(self.made.study, self.made.out, (), None, **asked) == code
         return to / "sub-01" / f"{STEM}.c3d"
 
 

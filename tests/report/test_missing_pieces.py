@@ -17,7 +17,7 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
-from bsip_cli.running.freshness import why_stale
+from bsip_cli.running.runner import why_stale
 from tests.report.fake_study import EVIL, Artifacts, gains, pictures_of
 
 

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -45,6 +46,7 @@ from bsip_cli.study.trials import Trial, trial_named
 
 _NOWHERE = Path("memory")
 _ID = "sub-01"
+_Kept = tuple[pd.DataFrame, dict[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +230,7 @@ class Person:
         KeyError: It has not been made.
         """
         own = self._trials[trial] if trial else None
-        return self._kept[self._unit(producer(kind)).path(kind, own)].frame.copy()
+        return self._kept[self._unit(producer(kind)).path(kind, own)][0].copy()
 
     # --- running them -------------------------------------------------------------------------
 
@@ -280,47 +282,30 @@ class Person:
         return _InMemory(stage, *whole, trial, recordings=self._recordings, kept=self._kept)
 
 
-@dataclass(frozen=True, eq=False)
-class _Kept:
-    """A table, what its stage said of it, and how many rows were its stage's own."""
-
-    frame: pd.DataFrame
-    facts: dict[str, Any]
-    rows_made: int
-
-
 @dataclass
 class _InMemory(Unit):
-    """A unit whose tables stay in memory, by the paths that they would have."""
+    """A unit whose tables, with what is said of them, stay in memory, by the paths that they would
+    have."""
 
     kept: dict[Path, _Kept] = field(default_factory=dict)
+
+    @cached_property
+    def made_by(self) -> dict[str, Any]:
+        """Of no files."""
+        return {}
 
     def _names(self, participant: Participant | None) -> frozenset[str]:
         return frozenset(path.name for path in self.kept)
 
-    def read(
-        self,
-        kind: str,
-        trial: Trial | None = None,
-        participant: Participant | None = None,
-        **wanted: Collection[str],
-    ) -> pd.DataFrame:
-        frame = self.kept[self.path(kind, trial, participant)].frame
+    def _table(self, path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFrame:
+        frame = self.kept[path][0]
         for column, values in wanted.items():
             frame = frame[frame[column].isin(list(values))]
         return frame.reset_index(drop=True)
 
-    def facts(
-        self, kind: str, trial: Trial | None = None, participant: Participant | None = None
-    ) -> dict[str, Any]:
-        return self.kept[self.path(kind, trial, participant)].facts
+    def _provenance(self, path: Path, kind: str) -> dict[str, Any]:
+        return self.kept[path][1]
 
-    def write(self, kind: str, frame: Rows, facts: dict[str, Any] | None = None) -> None:
-        plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
-        self.kept[self.path(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
-
-    def amend(self, kind: str, rows: pd.DataFrame) -> None:
-        before = self.kept[self.path(kind)]
-        made = before.frame.iloc[: before.rows_made]
-        whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        self.kept[self.path(kind)] = replace(before, frame=as_read(kind, whole))
+    def _keep(self, path: Path, kind: str, frame: Rows, notes: dict[str, Any]) -> None:
+        # as they would come back from a file
+        self.kept[path] = as_read(kind, frame), json.loads(json.dumps(notes))

@@ -264,14 +264,13 @@ class Unit:
         **wanted: Collection[str],
     ) -> pd.DataFrame:
         """An artifact, or those of its rows with the wanted values in text columns."""
-        return artifacts.read_artifact(self.path(kind, trial, participant), kind, **wanted)
+        return self._table(self.path(kind, trial, participant), kind, **wanted)
 
     def facts(
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> dict[str, Any]:
         """What the producing stage said of its result as a whole."""
-        header = artifacts.read_header(self.path(kind, trial, participant), kind)
-        return header["provenance"]["facts"]
+        return self._provenance(self.path(kind, trial, participant), kind)["facts"]
 
     def said_before(self, kind: str) -> dict[str, Any]:
         """Facts of what the unit has written last; empty where that cannot be read."""
@@ -281,7 +280,7 @@ class Unit:
             return {}
 
     def write(self, kind: str, frame: artifacts.Rows, facts: dict[str, Any] | None = None) -> None:
-        artifacts.write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
+        self._keep(self.path(kind), kind, frame, self._notes(facts or {}))
 
     def write_in_parts(
         self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict[str, Any]]
@@ -299,11 +298,22 @@ class Unit:
         What made the artifact stays what it was: its maker need not work again.
         """
         path = self.path(kind)
-        notes = artifacts.read_header(path, kind)["provenance"]
-        made = artifacts.read_artifact(path, kind).iloc[: notes.get("rows_made")]
+        notes = self._provenance(path, kind)
+        made = self._table(path, kind).iloc[: notes.get("rows_made")]
         notes |= {"amended_by": self.made_by, "rows_made": len(made)}
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        artifacts.write_artifact(path, kind, whole, notes)
+        self._keep(path, kind, whole, notes)
+
+    # where tables lie: here in files
+
+    def _table(self, path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFrame:
+        return artifacts.read_artifact(path, kind, **wanted)
+
+    def _provenance(self, path: Path, kind: str) -> dict[str, Any]:
+        return artifacts.read_header(path, kind)["provenance"]
+
+    def _keep(self, path: Path, kind: str, frame: artifacts.Rows, notes: dict[str, Any]) -> None:
+        artifacts.write_artifact(path, kind, frame, notes)
 
 
 def _owner(participant: Participant | None) -> str:

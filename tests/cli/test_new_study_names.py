@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -35,75 +36,47 @@ def short(named: Named) -> str:
     return named.stem.removeprefix("sub-").replace("task-", "").replace("run-", "")
 
 
-@pytest.mark.parametrize(
-    ("files", "expected"),
-    [
-        # one person
-        (["static.c3d", "swing1.c3d", "swing3.c3d"], ["01_static_1", "01_swing_1", "01_swing_3"]),
-        (["DJ1.trc", "DJ2.trc", "cal 01.trc"], ["01_DJ_1", "01_DJ_2", "01_static_1"]),
-        (["T-pose.c3d", "Gang 1.c3d", "Gang 2.c3d"], ["01_static_1", "01_Gang_1", "01_Gang_2"]),
-        (["0001.c3d", "0002.c3d", "0003_ST.c3d"], ["01_trial_1", "01_trial_2", "01_static_1"]),
-        (["walk_left_1.c3d", "walk_right_1.c3d"], ["01_left_1", "01_right_1"]),
-        (["walk.c3d", "walk.trc"], ["01_walk_1", "01_walk_2"]),
-        (["Größe_20230101.c3d", "体.c3d"], ["01_Grosse20230101_1", "01_trial_1"]),
-        (["Kalibrierung.c3d", "StatiqueDebout2.c3d"], ["01_static_1", "01_static_2"]),
-        # people by folders
-        (
-            ["P01/static.c3d", "P01/walk1.c3d", "P02/static.c3d", "P02/walk1.c3d"],
-            ["P01_static_1", "P01_walk_1", "P02_static_1", "P02_walk_1"],
-        ),
-        (
-            ["Anna/Session 1/walk.c3d", "Anna/Session 2/walk.c3d", "Ben/Session 1/walk.c3d"],
-            ["Anna_ses-1_walk_1", "Anna_ses-2_walk_1", "Ben_ses-1_walk_1"],
-        ),
-        (
-            ["Trial 1/P1/walk.c3d", "Trial 2/P2/walk.c3d", "20230105/P2/hop.c3d"],
-            ["P1_walk_1", "P2_walk_1", "P2_hop_1"],
-        ),
-        (
-            ["01/Day1/walk.c3d", "02/Day1/walk.c3d", "02/Day2/walk.c3d"],
-            ["01_ses-1_walk_1", "02_ses-1_walk_1", "02_ses-2_walk_1"],
-        ),
-        (
-            ["data/static/S1.c3d", "data/walking/S1.c3d", "data/static/S2.c3d"],
-            ["S1_static_1", "S1_walking_1", "S2_static_1"],
-        ),
-        (["MarkerData/walk1.trc", "MarkerData/static1.trc"], ["01_walk_1", "01_static_1"]),
-        # people by the beginnings of names
-        (
-            ["HC1-static.c3d", "HC1-turn.c3d", "HC2-static.c3d", "HC2-turn.c3d"],
-            ["HC1_static_1", "HC1_turn_1", "HC2_static_1", "HC2_turn_1"],
-        ),
-        (
-            ["AB_static.c3d", "AB_walk1.c3d", "CD_static.c3d", "CD_walk1.c3d"],
-            ["AB_static_1", "AB_walk_1", "CD_static_1", "CD_walk_1"],
-        ),
-        (
-            ["K01static.c3d", "K01walk3.c3d", "K02static.c3d"],
-            ["K01_static_1", "K01_walk_3", "K02_static_1"],
-        ),
-        (
-            ["static_VP3.c3d", "walk 2_VP3.c3d", "walk 1_VP4.c3d"],
-            ["VP3_static_1", "VP3_walk_2", "VP4_walk_1"],
-        ),
-        (
-            ["static_1.c3d", "static_2.c3d", "walk_1.c3d", "walk_2.c3d"],  # runs
-            ["01_static_1", "01_static_2", "01_walk_1", "01_walk_2"],
-        ),
-        (["subj01_walk2.c3d", "subj02_walk1.c3d"], ["subj01_walk_2", "subj02_walk_1"]),
-        (
-            ["walk1_left.c3d", "walk2_left.c3d", "static.c3d"],  # no people: one of them stands
-            ["01_walk1Left_1", "01_walk2Left_1", "01_static_1"],
-        ),
-        # as in BIDS already
-        (
-            ["sub-A7_task-squat_run-3.c3d", "sub-A7/ses-2/sub-A7_ses-2_task-hop.c3d"],
-            ["A7_squat_3", "A7_ses-2_hop_1"],
-        ),
-    ],
-)
-def test_names(files, expected):
-    assert names(*files) == expected
+# files > names
+CASES = """
+# one person
+static.c3d | swing1.c3d | swing3.c3d > 01_static_1 01_swing_1 01_swing_3
+DJ1.trc | DJ2.trc | cal 01.trc > 01_DJ_1 01_DJ_2 01_static_1
+T-pose.c3d | Gang 1.c3d | Gang 2.c3d > 01_static_1 01_Gang_1 01_Gang_2
+0001.c3d | 0002.c3d | 0003_ST.c3d > 01_trial_1 01_trial_2 01_static_1
+walk_left_1.c3d | walk_right_1.c3d > 01_left_1 01_right_1
+walk.c3d | walk.trc > 01_walk_1 01_walk_2
+Größe_20230101.c3d | 体.c3d > 01_Grosse20230101_1 01_trial_1
+Kalibrierung.c3d | StatiqueDebout2.c3d > 01_static_1 01_static_2
+# people by folders
+P01/static.c3d | P01/walk1.c3d | P02/static.c3d | P02/walk1.c3d >
+    P01_static_1 P01_walk_1 P02_static_1 P02_walk_1
+Anna/Session 1/walk.c3d | Anna/Session 2/walk.c3d | Ben/Session 1/walk.c3d >
+    Anna_ses-1_walk_1 Anna_ses-2_walk_1 Ben_ses-1_walk_1
+Trial 1/P1/walk.c3d | Trial 2/P2/walk.c3d | 20230105/P2/hop.c3d > P1_walk_1 P2_walk_1 P2_hop_1
+01/Day1/walk.c3d | 02/Day1/walk.c3d | 02/Day2/walk.c3d >
+    01_ses-1_walk_1 02_ses-1_walk_1 02_ses-2_walk_1
+data/static/S1.c3d | data/walking/S1.c3d | data/static/S2.c3d >
+    S1_static_1 S1_walking_1 S2_static_1
+MarkerData/walk1.trc | MarkerData/static1.trc > 01_walk_1 01_static_1
+# people by the beginnings of names
+HC1-static.c3d | HC1-turn.c3d | HC2-static.c3d | HC2-turn.c3d >
+    HC1_static_1 HC1_turn_1 HC2_static_1 HC2_turn_1
+AB_static.c3d | AB_walk1.c3d | CD_static.c3d | CD_walk1.c3d >
+    AB_static_1 AB_walk_1 CD_static_1 CD_walk_1
+K01static.c3d | K01walk3.c3d | K02static.c3d > K01_static_1 K01_walk_3 K02_static_1
+static_VP3.c3d | walk 2_VP3.c3d | walk 1_VP4.c3d > VP3_static_1 VP3_walk_2 VP4_walk_1
+static_1.c3d | static_2.c3d | walk_1.c3d | walk_2.c3d > 01_static_1 01_static_2 01_walk_1 01_walk_2
+subj01_walk2.c3d | subj02_walk1.c3d > subj01_walk_2 subj02_walk_1
+walk1_left.c3d | walk2_left.c3d | static.c3d > 01_walk1Left_1 01_walk2Left_1 01_static_1
+# as in BIDS already
+sub-A7_task-squat_run-3.c3d | sub-A7/ses-2/sub-A7_ses-2_task-hop.c3d > A7_squat_3 A7_ses-2_hop_1
+"""
+
+
+@pytest.mark.parametrize("case", re.findall("^[^#\n].*", CASES.replace("\n   ", ""), re.MULTILINE))
+def test_names(case):
+    files, expected = case.split(" > ")
+    assert names(*files.split(" | ")) == expected.split()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -44,25 +44,23 @@ from bsip_cli.study.study import describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
-# Of a trial: names of files with their content, and what else the user should know.
-Texts = tuple[dict[str, str], str]
+Texts = dict[str, str]  # of a trial: names of files with their content
 # Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.
 _EDGE = 5
 
 
-def _export_tables(unit: Unit, asked: Request, model: str) -> Iterator[str]:
+def _export_tables(unit: Unit, asked: Request, model: str) -> list[str]:
     folder = asked.folder_of(unit)
     with held_alone(unit.out / unit.person.id):
-        texts, note = _TABLES[asked.what](unit, model)
+        texts = _TABLES[asked.what](unit, model)
         for name, text in texts.items():
             write_bytes(folder / name, text.encode())
-    yield from filter(None, [note])
-    yield f"{folder}: {', '.join(Path(name).name for name in texts)}"
+    return [f"{folder}: {', '.join(Path(name).name for name in texts)}"]
 
 
 def _joints(unit: Unit, _: str) -> Texts:
     table = unit.read("joint-moments")
-    return {f"{unit.name}_joint-moments.csv": table.to_csv(index=False, float_format="%.9g")}, ""
+    return {f"{unit.name}_joint-moments.csv": table.to_csv(index=False, float_format="%.9g")}
 
 
 def _bids(unit: Unit, _: str) -> Texts:
@@ -84,7 +82,7 @@ def _bids(unit: Unit, _: str) -> Texts:
         f"{place}_motion.json": bids_motion.motion_json(columns, trial.task, rate_hz, __version__),
         f"{place}_channels.tsv": bids_motion.channels_tsv(columns),
         f"{place}_channels.json": bids_motion.channels_json(),
-    }, ""
+    }
 
 
 def _opensim(unit: Unit, model: str) -> Texts:
@@ -104,7 +102,8 @@ def _opensim(unit: Unit, model: str) -> Texts:
         whole &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)
     found = max(runs(whole), key=lambda run: run[1] - run[0], default=(0, 0))
     if found[1] - found[0] < 2:
-        return texts, "no loads: the plates do not measure what acts on each foot alone"
+        unit.say("no loads: the plates do not measure what acts on each foot alone")
+        return texts
     frames = slice(*found)
     times = trial.times_s[frames]
     acting = loads({foot: w[frames] for foot, w in wrenches.items()})
@@ -115,7 +114,8 @@ def _opensim(unit: Unit, model: str) -> Texts:
     setup = setup_xml(f"{name}_inverse-dynamics", files, times[0], times[-1], said)
     texts[f"{name}_inverse-dynamics.xml"] = setup
     note = f"forces of each foot are known from {times[0]:.2f} to {times[-1]:.2f} s"
-    return texts, note + "; known loads are not in the model" * bool(unit.loads())
+    unit.say(note + "; known loads are not in the model" * bool(unit.loads()))
+    return texts
 
 
 # By what is asked for, who writes it.

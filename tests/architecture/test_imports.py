@@ -6,6 +6,7 @@ from graphlib import TopologicalSorter
 
 import pytest
 
+from bsip_cli.files.regular import read_toml, shipped
 from tests.architecture.imports_of import modules, names_from, package
 
 SCIENCE = ("body", "dynamics", "motion", "recordings", "statistics", "identification")
@@ -29,7 +30,7 @@ ALLOWED = {
     "commands": "__init__ artifacts body config diagnosis effects errors files identification "
     "instruments pipeline recordings report running schemas segments stages statistics study",
     "reference": "cli config effects files pipeline report schemas",
-    "cli": "__init__ commands errors files pipeline running simulate study",
+    "cli": "__init__ errors files pipeline running",  # and what configs/commands.toml names
     "body": "errors files segments stated",
     "dynamics": "body errors segments",
     "caches": "",
@@ -51,7 +52,6 @@ FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subproce
 # Single modules of a part that may be imported, where the part as a whole may not.
 ONLY = {
     "simulate": {"body": {"body.markersets"}},
-    "cli": {"simulate": {"simulate.study"}},
     "library": {"running": {"running.unit"}, "stages": {"stages.frames"}},
     "commands": {
         "stages": {
@@ -127,7 +127,13 @@ def test_imports_of_another_part_only_what_is_shared(module, part, known):
 def test_the_fitted_side_does_not_know_the_simulator():
     """Who finds must not see the truth."""
     users = {name for name in modules() if any(package(m) == "simulate" for m in inner(name))}
-    assert {package(name) for name in users} == {"cli", "simulate"}
+    assert {package(name) for name in users} == {"simulate"}
+    commands = read_toml(shipped("commands.toml"))["commands"].values()
+    named = {one["does"].split()[0] for one in commands}
+    assert {name for name in named if package(name) != "commands"} == {
+        "simulate.study",
+        "study.participants",
+    }
 
 
 def test_stages_do_not_know_each_other():

@@ -14,7 +14,7 @@ import pandas as pd
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Terms, first_of
-from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
+from bsip_cli.report.causes import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
 from bsip_cli.statistics.methods import MEASURED, RM, is_extended
 
@@ -121,14 +121,10 @@ class ParticipantRecord:
     def use(self, movement: str = "all") -> str:
         """The method whose parameters are to be used, in one movement or mostly; the table's where
         nothing was chosen."""
-        chosen = self._chosen
-        return chosen.get(movement, next(iter(chosen.values()), RM))
-
-    @cached_property
-    def _chosen(self) -> dict[str, str]:
-        """By movement."""
-        table = self.choice
-        return {} if table is None else dict(zip(table["movement"], table["use"], strict=True))
+        if self.choice is None or self.choice.empty:
+            return RM
+        chosen = dict(zip(self.choice["movement"], self.choice["use"], strict=True))
+        return str(chosen.get(movement, self.choice["use"].iloc[0]))
 
     def use_words(self) -> str:
         """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""

@@ -10,8 +10,8 @@ import pytest
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.report.blocks import Grid
-from bsip_cli.report.cohort.document import cohort_document, is_far
-from bsip_cli.report.cohort.record import CohortRecord, Ratios
+from bsip_cli.report.cohort import cohort_document, is_far
+from bsip_cli.report.cohort_record import CohortRecord, Ratios
 from bsip_cli.report.records import HowMade
 from bsip_cli.report.words import MISSING
 from bsip_cli.schemas import column_names

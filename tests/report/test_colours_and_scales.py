@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Bar, Document, Scales, render
-from bsip_cli.report.budget_words import overall_pieces
-from bsip_cli.report.cause_colours import COLOURS, FAULT, Piece, fills
+from bsip_cli.report.budget import COLOURS, FAULT, HATCHES, Piece, fills, overall_pieces
 from bsip_cli.report.errors import yardsticks
 from bsip_cli.report.words import abbreviations
 from tests.report.fake_study import error_budget
@@ -36,7 +34,7 @@ def test_faults_share_their_colour_and_differ_by_their_hatching():
     faults = [Piece(name, 25.0, (FAULT,)) for name in "abcd"]
     found = fills(faults)
     assert {one.colours for one in found.values()} == {(COLOURS[FAULT],)}
-    assert len({one.css() for one in found.values()}) == len(cause_colours.HATCHES)
+    assert len({one.css() for one in found.values()}) == len(HATCHES)
 
 
 def test_pieces_know_their_kinds():

@@ -15,7 +15,7 @@ from bsip_cli.report.blocks import (
     Scales,
     Terms,
 )
-from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.participant import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
 from bsip_cli.running.freshness import why_stale
 from tests.report.fake_study import EVIL, Artifacts, gains, pictures_of

@@ -12,12 +12,11 @@ from bsip_cli.commands.show import shown
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.report.blocks import Links, Numbered, Scales
-from bsip_cli.report.budget_words import budget_sentences
-from bsip_cli.report.candidates import candidates_of, causes_of
-from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.budget import budget_sentences
+from bsip_cli.report.causes import candidates_of, causes_of, effect_title
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.first_page import budget_bar, front
-from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.joints import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
     large_finding,
@@ -277,7 +276,7 @@ def test_the_parameters_for_now_have_the_full_dot(record):
         (scales,) = (block for block in front(one) if isinstance(block, Scales))
         return float(scales.scales[0].shown.split()[0])
 
-    fits = {name: dict(measured_of(waits, name)) for name in ("RM", "OM")}
+    fits = {name: measured_of(waits, name) for name in ("RM", "OM")}
     cop = {name: next(iter(sizes.values())) for name, sizes in fits.items()}
     assert cop["RM"] != pytest.approx(cop["OM"], abs=0.1)
     assert cop_of(waits) == pytest.approx(cop["RM"], abs=0.06)
@@ -442,7 +441,7 @@ def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
 
 
 def test_errors_by_other_parameters_stand_beside(record):
-    assert {one.name: size for one, size in measured_of(record, "RM")}[COP] > 0
+    assert {one.name: size for one, size in measured_of(record, "RM").items()}[COP] > 0
     everywhere = replace(record, choice=record.choice.query("movement == 'all'"))  # OM
     for used, differs in ((everywhere, True), (record, False)):  # in basketball RM, held out alone
         scales = next(block for block in front(used) if hasattr(block, "scales")).scales
@@ -450,4 +449,4 @@ def test_errors_by_other_parameters_stand_beside(record):
     table = replace(record, choice=record.choice.assign(use="RM"))
     scales = next(block for block in front(table) if hasattr(block, "scales")).scales
     assert not any(scale.other for scale in scales)
-    assert np.isfinite({one.name: size for one, size in measured_of(record)}[MARKERS])
+    assert np.isfinite({one.name: size for one, size in measured_of(record).items()}[MARKERS])

@@ -1,33 +1,141 @@
-"""The papers' six tables, from the cohort's results to text; here those of sway and components."""
+"""The papers' six tables, from the cohort's results to text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
-from bsip_cli.report.tables import model, paired, published
+from bsip_cli.report.tables import published
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
 from bsip_cli.report.tables.model import (
+    AXES,
+    TEXTS,
     Cell,
-    Column,
     Results,
     Row,
     Table,
-    column,
-    count,
-    mean_sd,
+    columns,
+    columns_of,
+    p_value,
     unit_label,
 )
-from bsip_cli.report.tables.paired import REASON, SHORT
-from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, all_reasons
-from bsip_cli.statistics.methods import MEASURED, OM, RM
+from bsip_cli.report.words import segment_label
+from bsip_cli.statistics.cohort import (
+    DATA_SHARE,
+    DIFFERENCE,
+    Comparison,
+    Criteria,
+    Topic,
+    all_reasons,
+)
+from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
+from bsip_cli.statistics.published import load_paper
 
-# --- table 3: sway of the measured and the simulated centre of pressure ---------------------------
+NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
+
+
+class Line(NamedTuple):
+    """A row in the making: its topic, what this is called in notes, the values that come from no
+    test of it, and the row's group."""
+
+    topic: Topic
+    label: str
+    own: dict[str, Cell]
+    group: str = ""
+
+
+Marks = Callable[[Results, Topic, Criteria], dict[str, str]]
+
+
+def _stars(results: Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
+    """At both p of the paired tests."""
+    against = {"p": RM, "p OM, RM+mass": RM_MASS}
+    tests = {heading: results.find(topic, "paired_t", OM, x) for heading, x in against.items()}
+    return {heading: _sign(test, criteria) for heading, test in tests.items()}
+
+
+def _sign(row: Comparison, criteria: Criteria, sign: str = "*") -> str:
+    """The sign if p < alpha, else nothing."""
+    return sign if row.p_value < criteria.alpha else ""
+
+
+def _table(
+    name: str,
+    lines: Sequence[Line],
+    given: tuple[Results, Criteria],
+    tests: Sequence[Comparison] | None = None,
+    marks: Marks = _stars,
+    named: Mapping[Topic, str] | None = None,
+    **words: str,
+) -> Table:
+    """``tests``: whose numbers the legend sums up, if not those of OM against RM; ``named``: what
+    topics are called, if not those of the lines; ``words``: what only this table says."""
+    results, criteria = given
+    words |= {"ci": f"{100.0 * (1.0 - criteria.alpha):g}% CI"}
+    found = columns_of(name, **words)
+    rows = [
+        Row(
+            results.values(one.topic, found) | {"reason": results.reasons(one.topic)} | one.own,
+            one.topic.unit,
+            one.group,
+            marks(results, one.topic, criteria),
+        )
+        for one in lines
+    ]
+    tests = [results.find(one.topic, "paired_t") for one in lines] if tests is None else tests
+    words |= _words(results, tests, criteria)
+    texts = [text.format(**words) for text in (TEXTS[name]["title"], *TEXTS[name]["notes"])]
+    texts += _not_possible(results, named or {one.topic: one.label for one in lines})
+    return Table(name, texts[0], found, tuple(rows), tuple(filter(None, texts[1:])))
+
+
+# --- the tables -----------------------------------------------------------------------------------
+
+_LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
+_SEGMENTS = ["lower_torso", "upper_torso", "head"]
+_SEGMENTS += [f"{part}_{side}" for limb in _LIMBS for side in "lr" for part in limb]
+"""As in table 1 of Hansen 2017; other segments follow."""
+_QUANTITIES: dict[str, str] = TEXTS["quantities"]
+_RESIDUALS = {"force_residual": "force", "moment_residual": "moment"}
+_OVER_SEGMENTS = {"mean": "mean", "median": "median", "max": "largest"}
+_COM = "com_"
+
+
+def _segment_rank(name: str) -> int:
+    return _SEGMENTS.index(name) if name in _SEGMENTS else len(_SEGMENTS)
+
+
+def _task_label(topic: Topic) -> str:
+    """The movement; the one that identified OM is named as such."""
+    identified = " (identified OM; in the paper: random, 120 s)"
+    return topic.task + identified * (topic.role == "sequence")
+
+
+def _segment_mass(results: Results, criteria: Criteria) -> Table:
+    lines = []
+    for topic in sorted(results.topics, key=lambda topic: _segment_rank(topic.variable)):
+        if not (name := topic.variable).endswith(DATA_SHARE):
+            of_share = replace(topic, variable=name + DATA_SHARE, unit="1")
+            share = results.find(of_share, "description", OM, "")
+            own: dict[str, Cell] = {"segment": name, "mass_data_share": share.mean_a}
+            own["mass_data_share_sd"] = share.sd_a
+            lines.append(Line(topic, segment_label(name), own))
+    return _table(NAMES[0], lines, (results, criteria))
+
+
+def _cop_rmse(results: Results, criteria: Criteria) -> Table:
+    lines = [Line(x, AXES[x.variable], {"axis": x.variable}) for x in results.topics]
+    table = _table(NAMES[1], lines, (results, criteria))
+    if len({row.values["n"] for row in table.rows}) > 1:
+        return table
+    return replace(table, columns=tuple(c for c in table.columns if c.fields != ("n",)))
+
 
 _MARKS = {
     (MEASURED, OM): ("OM M(SD)", "#"),
@@ -36,98 +144,69 @@ _MARKS = {
 }
 """Where the sign of a post hoc difference stands, and which it is, after the print."""
 
-_ALL = " / ".join((MEASURED, OM, RM)), ""
+
+def _marks_of_sway(results: Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
+    marks = _stars(results, topic, criteria)
+    for pair, (heading, sign) in _MARKS.items():
+        differs = _sign(results.find(topic, "bonferroni_t", *pair), criteria, sign)
+        marks[heading] = differs + marks.get(heading, "")
+    return marks
 
 
 def _posturography(results: Results, criteria: Criteria) -> Table:
-    alpha, short = criteria.alpha, {MEASURED: "fp"} | SHORT
-    measured = "bonferroni_t.mean_a bonferroni_t.sd_a"
-    tests_after = {"bonferroni_p": "bonferroni_t", "repeated_bonferroni_p": "bonferroni_paired_t"}
-    post_hoc = [
-        column(f"{kind}_{short[a]}_{short[b]}", f"{test}.p_value", pair=(a, b))
-        for (kind, test), (a, b) in product(tests_after.items(), _MARKS)
-    ]
-    columns = (
-        Column(("variable",)),
-        Column(("label",), "Variable", text=True),
-        column("n", "one_way_anova.n", pair=_ALL),
-        column("fp_mean fp_sd", measured, "FP M(SD)", mean_sd(2), (MEASURED, RM), True),
-        *paired.means("bonferroni_t"),
-        *model.columns("anova", _ALL),
-        *post_hoc,
-        *paired.against_rm_mass(criteria),
-        REASON,
-    )
-    named = {t: f"{model.TEXTS['sway'][t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
-    rows = []
-    for topic, label in named.items():
-        own = {"variable": topic.variable, "label": label, "reason": results.reasons(topic)}
-        marks = paired.stars(results, topic, criteria)
-        for pair, (heading, sign) in _MARKS.items():
-            differs = model.star(results.find(topic, "bonferroni_t", *pair), alpha, sign)
-            marks[heading] = differs + marks.get(heading, "")
-        rows.append(Row(results.values(topic, columns) | own, topic.unit, marks=marks))
-    tests = [results.find(topic, "one_way_anova", *_ALL) for topic in results.topics]
-    title, legend = model.texts_of(NAMES[2], results, tests, criteria)
-    notes = (*legend, *model.not_possible(results, named))
-    return Table(NAMES[2], title, columns, tuple(rows), notes)
+    """Sway of the measured and the simulated centre of pressure."""
+    lines = []
+    for topic in results.topics:
+        label = f"{TEXTS['sway'][topic.variable]} [{unit_label(topic.unit)}]"
+        lines.append(Line(topic, label, {"variable": topic.variable, "label": label}))
+    all_three = " / ".join((MEASURED, OM, RM)), ""
+    tests = [results.find(topic, "one_way_anova", *all_three) for topic in results.topics]
+    return _table(NAMES[2], lines, (results, criteria), tests, _marks_of_sway)
 
 
-# --- table 5: the six components of the ground wrench, movement by movement (Hansen 2014) ---------
+def _cross_validation(results: Results, criteria: Criteria) -> Table:
+    """Errors of the centre of pressure and of the vertical force by movement."""
+    order, lines = list(_QUANTITIES), []
+    for topic in sorted(
+        results.topics, key=lambda t: (order.index(t.variable), t.role == "sequence", t.task)
+    ):
+        quantity = _QUANTITIES[topic.variable]
+        own: dict[str, Cell] = {"quantity": topic.variable, "task": topic.task}
+        own |= {"role": topic.role, "label": _task_label(topic)}
+        group = f"{quantity} [{unit_label(topic.unit)}]"
+        lines.append(Line(topic, f"{quantity}, {topic.task}", own, group))
+    return _table(NAMES[3], lines, (results, criteria))
+
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 _MEASURES = {"rmse": "rmse", "pearson_r": "r", "schwer_m": "m", "schwer_p": "p", "schwer_c": "c"}
 """Measure of the data: its name in the CSV."""
 
-_DIFFER = "r differs OM : RM"
-
 
 def _six_components(results: Results, criteria: Criteria) -> Table:
+    """The components of the ground wrench, movement by movement (Hansen 2014); tests stand in OM's
+    row, those of the other methods leave them empty."""
     errors = [topic for topic in results.topics if topic.variable.endswith("_rmse")]
     errors.sort(key=lambda t: (t.role == "sequence", t.task, _COMPONENTS.index(t.variable[:2])))
-    of_error = list(_errors_of_six())
-    of_r = model.columns("correlations", differ=_DIFFER)
+    differ = "r differs OM : RM"
+    of_error, of_r = columns("smaller_of_six"), columns("correlations", differ=differ)
+    lines: list[Line] = []
     named: dict[Topic, str] = {}
-    rows = []
     for topic in errors:
         component, r = topic.variable[:2], _sibling(topic, "r")
-        name = component.capitalize()
-        named |= dict.fromkeys((topic, r), f"{name}, {topic.task}")
+        label = f"{component.capitalize()}, {topic.task}"
+        named |= dict.fromkeys((topic, r), label)
         of_topic: dict[str, Cell] = {"task": topic.task, "role": topic.role, "component": component}
         of_topic["n"] = results.find(topic, "paired_t").n
         tests = results.values(topic, of_error) | results.values(r, of_r)
-        tests["label"] = f"{name} [{unit_label(topic.unit)}]"
+        tests["label"] = f"{component.capitalize()} [{unit_label(topic.unit)}]"
         tests["reason"] = all_reasons(results.reasons(topic), results.reasons(r))
-        for method in SHORT:  # tests stand in OM's row; those of other methods leave them empty
+        for method in (OM, RM, RM_MASS):
             own = tests if method == OM else dict.fromkeys(tests, "")
-            of_method = _means_of_six(results, topic, method)
-            values = {**of_topic, "method": method, **own, **of_method}
-            rows.append(Row(values, topic.unit, paired.task_label(topic)))
-    columns = (
-        *(Column((name,)) for name in ("task", "role", "component")),
-        Column(("label",), "Component", text=True),
-        Column(("method",), "Method", text=True),
-        Column(("n",), "n", count),
-        Column(("rmse_mean", "rmse_sd"), "RMSE", mean_sd(2), in_row_unit=True),
-        *(Column((f"{x.lower()}_mean", f"{x.lower()}_sd"), x, mean_sd(3)) for x in "rMPC"),
-        *of_error,
-        *of_r,
-        REASON,
-    )
-    tests_of_error = [results.find(topic, "paired_t") for topic in errors]
-    title, legend = model.texts_of(NAMES[4], results, tests_of_error, criteria, differ=_DIFFER)
-    notes = (*legend, *model.not_possible(results, named))
-    return Table(NAMES[4], title, columns, tuple(rows), notes)
-
-
-def _errors_of_six() -> Iterator[Column]:
-    for one in paired.smaller_error("n_paired", "sign.n"):
-        yield one
-        name, pair = one.fields[0], one.of[0][2:]
-        if name.endswith("sign_test_p"):
-            before = name.removesuffix("sign_test_p")
-            yield column(f"{before}rmse_t", "paired_t.statistic", pair=pair)
-            yield column(f"{before}rmse_t_p", "paired_t.p_value", pair=pair)
+            own = of_topic | {"method": method} | own | _means_of_six(results, topic, method)
+            lines.append(Line(topic, label, own, _task_label(topic)))
+    given = results, criteria
+    return _table(NAMES[4], lines, given, marks=lambda *_: {}, named=named, differ=differ)
 
 
 def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell]:
@@ -143,18 +222,103 @@ def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell
 
 
 def _sibling(topic: Topic, measure: str) -> Topic:
-    return Topic(topic.table, topic.variable[:3] + measure, topic.task, topic.role, "1")
+    return replace(topic, variable=topic.variable[:3] + measure, unit="1")
+
+
+def _centres_of_mass(results: Results, criteria: Criteria) -> Table:
+    """What identification changes, as Robert 2017 compares it."""
+    order = [*_RESIDUALS, *(_COM + name for name in _OVER_SEGMENTS)]
+
+    def rank(topic: Topic) -> tuple[int, int]:
+        """Residuals, then over the segments, then segment by segment."""
+        place = order.index(topic.variable) if topic.variable in order else len(order)
+        return place, _segment_rank(topic.variable.removeprefix(_COM))
+
+    lines, tests = [], []
+    for topic in sorted(results.topics, key=rank):
+        name = topic.variable.removeprefix(_COM)
+        whose = _RESIDUALS.get(name) or _OVER_SEGMENTS.get(name) or segment_label(name)
+        label = f"{whose} [{unit_label(topic.unit)}]"
+        own: dict[str, Cell] = {"variable": topic.variable, "label": label}
+        if is_residual := topic.variable in _RESIDUALS:
+            tests.append(results.find(topic, "paired_t"))
+        else:
+            own["n"] = results.find(topic, "description", DIFFERENCE, "").n
+        group = "Residual" if is_residual else "Centres of mass along the segments"
+        lines.append(Line(topic, label, own, group))
+    printed = "; ".join(_in_print())
+    return _table(NAMES[5], lines, (results, criteria), tests, in_print=printed)
+
+
+def _in_print() -> Iterator[str]:
+    """The published cases: residuals, then mean, median and largest distance."""
+    for row in load_paper("robert2017").table(1).rows:
+        force, moment, *apart = (cell.text for cell in row.cells.values())
+        yield f"{row.name} {force} N, {moment} N m; {', '.join(apart)} m"
+
+
+# --- notes: who is in a table, what the stars mean, what could not be tested ----------------------
+
+
+def _words(results: Results, tests: Sequence[Comparison], criteria: Criteria) -> dict[str, str]:
+    """What titles and legends are filled with."""
+    numbers = sorted({row.n for row in tests} or {0})
+    how_many = " to ".join(dict.fromkeys(map(str, (numbers[0], numbers[-1]))))
+    alpha = criteria.alpha
+    level = p_value(alpha) if alpha < 0.01 else f"{alpha:g}".removeprefix("0")
+    done = [row for row in tests if not isnan(row.p_value)]
+    known = {
+        "n": f"n = {how_many} participant{'' if numbers[-1] == 1 else 's'}",
+        "alpha": f"{alpha:g}",
+        "level": level,
+        "percent": f"{criteria.equivalence_percent:g}",
+        "tasks": ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none",
+        "done": str(len(done)),
+        "before": str(sum(row.p_value < alpha for row in done)),
+        "after": str(sum(row.p_holm < alpha for row in done)),
+    }
+    said = {name: text.format(**known) for name, text in TEXTS["shared"].items()}
+    said["holm"] = said["holm"] if len(done) > 1 else ""
+    return known | said
+
+
+def _not_possible(results: Results, labels: Mapping[Topic, str]) -> Iterator[str]:
+    """A sentence for each reason why a test is missing, with the labels of its rows."""
+    concerned: dict[str, dict[str, None]] = defaultdict(dict)
+    for topic, label in labels.items():
+        for row in results.about(topic):
+            if row.reason:
+                concerned[row.reason][label] = None
+    everyone = set(labels.values())
+    for reason, names in concerned.items():
+        where = "all rows" if len(names) == len(everyone) > 1 else _named([*names])
+        yield f"Not possible ({where}): {reason}"
+
+
+def _fitted_on(counts: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """For each task what its data were to OM: those it was fitted to, or data it never saw."""
+    for one in counts:
+        kind = "fitted" if one["identification"] else one["role"]
+        if kind in TEXTS["data"]:
+            yield TEXTS["data"][kind].format(**one)
+
+
+def _named(names: Sequence[str], comma: str = ", ") -> str:
+    """The first names, and how many more there are."""
+    shown = comma.join(names[:NAMED_AT_MOST])
+    more = len(names) - NAMED_AT_MOST
+    return f"{shown}{comma}and {more} more" if more > 0 else shown
 
 
 # --- all of them ----------------------------------------------------------------------------------
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
-    "table1": paired.segment_mass,
-    "table2": paired.cop_rmse,
+    "table1": _segment_mass,
+    "table2": _cop_rmse,
     "table3": _posturography,
-    "table4": paired.cross_validation,
+    "table4": _cross_validation,
     "table5": _six_components,
-    "table6": paired.centres_of_mass,
+    "table6": _centres_of_mass,
 }
 IN_PRINT = ("table1", "table2", "table3", "table4")
 NAMES = (
@@ -188,12 +352,10 @@ def build_tables(
     tables = []
     for tag, build in BUILDERS.items():
         table = build(of_table[tag], criteria)
-        absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
-        more = (
-            *model.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
-            f"Missing: {model.named(absent, '; ')}." if absent else "",
-        )
-        tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
+        notes = [*table.notes, *_fitted_on(one for one in fitted_on if one["table"] == tag)]
+        if absent := [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]:
+            notes.append(f"Missing: {_named(absent, '; ')}.")
+        tables.append(replace(table, notes=tuple(notes)))
     return (*tables, *(published.next_to_published(tag, of_table[tag]) for tag in IN_PRINT))
 
 

@@ -17,20 +17,20 @@ _SUFFIXES |= {"mm/s": "_mm_s", "N m": "_Nm", "% body weight": "_percent_bw", "1"
 
 def to_csv(table: Table) -> str:
     """Text of the file; a number that is not there is an empty cell."""
-    units = tuple(dict.fromkeys(row.unit for row in table.rows))
+    units = dict.fromkeys(row.unit for row in table.rows)
     fields = [
         (name, unit)
         for column in table.columns
         for unit in (units if column.in_row_unit else (None,))
         for name in column.fields
     ]
+    lines = [
+        [_text(row.values[name]) if unit in (None, row.unit) else "" for name, unit in fields]
+        for row in table.rows
+    ]
+    head = [name if unit is None else name + _SUFFIXES[unit] for name, unit in fields]
     stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(name if unit is None else name + _SUFFIXES[unit] for name, unit in fields)
-    for row in table.rows:
-        writer.writerow(
-            _text(row.values[name]) if unit in (None, row.unit) else "" for name, unit in fields
-        )
+    csv.writer(stream, lineterminator="\n").writerows([head, *lines])
     return stream.getvalue()
 
 
@@ -77,14 +77,12 @@ def escape_latex(text: str) -> str:
 
 
 def _latex_body(table: Table) -> Iterator[str]:
-    width, group = len(table.printed_columns()), ""
-    for row in table.rows:
-        if row.group != group:
-            if group:
-                yield r"\addlinespace"
-            group = row.group
+    width = len(table.printed_columns())
+    for k, (group, rows) in enumerate(table.printed_groups()):
+        if group:
+            yield from [r"\addlinespace"] * (k > 0)
             yield rf"\multicolumn{{{width}}}{{l}}{{\textit{{{escape_latex(group)}}}}} \\"
-        yield _latex_line(table.printed_cells(row))
+        yield from map(_latex_line, rows)
 
 
 def _latex_line(cells: Sequence[str]) -> str:
@@ -94,25 +92,23 @@ def _latex_line(cells: Sequence[str]) -> str:
 
 def to_markdown(table: Table) -> str:
     """Title, table with aligned columns, notes; a line with a group's name before its first row."""
-    columns, group = table.printed_columns(), ""
+    columns = table.printed_columns()
     lines: list[Sequence[str]] = [[column.heading for column in columns]]
-    for row in table.rows:
-        if row.group != group:
-            group = row.group
-            lines.append([group, *[""] * (len(columns) - 1)])
-        lines.append(table.printed_cells(row))
+    for group, rows in table.printed_groups():
+        lines += [[group, *[""] * (len(columns) - 1)]] if group else []
+        lines += rows
     lines = [[escape_markdown(cell) for cell in line] for line in lines]
-    widths = [max(3, *(len(line[k]) for line in lines)) for k in range(len(columns))]
+    widths = [max(3, *map(len, cells)) for cells in zip(*lines, strict=True)]
+    ends = [
+        "-" * w if c.text else "-" * (w - 1) + ":" for w, c in zip(widths, columns, strict=True)
+    ]
     pads = [str.ljust if column.text else str.rjust for column in columns]
-    ends = zip(widths, columns, strict=True)
-    lines.insert(1, ["-" * w if one.text else "-" * (w - 1) + ":" for w, one in ends])
-    padded = (
-        [pad(cell, width) for pad, cell, width in zip(pads, line, widths, strict=True)]
-        for line in lines
+    body = "".join(
+        f"| {' | '.join(pad(x, w) for pad, x, w in zip(pads, line, widths, strict=True))} |\n"
+        for line in (lines[0], ends, *lines[1:])
     )
-    body = "\n".join(f"| {' | '.join(cells)} |" for cells in padded)
     notes = "".join(f"\n{escape_markdown(note)}\n" for note in table.notes)
-    return f"**{escape_markdown(table.title)}**\n\n{body}\n{notes}"
+    return f"**{escape_markdown(table.title)}**\n\n{body}{notes}"
 
 
 def escape_markdown(text: str) -> str:

@@ -21,6 +21,7 @@ from bsip_cli.report.budget import Piece, fills
 from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
+    from bsip_cli.report.errors import Yardstick
     from bsip_cli.report.figures.canvas import Figure
 
 Mark = Literal["", "better", "warning", "group"]
@@ -118,28 +119,11 @@ class Bar(Block):
 
 
 @dataclass(frozen=True)
-class Scale:
-    """A number between what is good and what is too large, all in one unit; ``words`` say which it
-    is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
-    arrow points. ``other``: the same by other parameters; None where there are none."""
-
-    title: str
-    shown: str
-    words: str
-    part: float
-    good_part: float
-    limit_part: float
-    good: str
-    limit: str
-    is_beyond: bool = False
-    other: Scale | None = None
-
-
-@dataclass(frozen=True)
 class Scales(Block):
-    """Numbers side by side, each on its way to its limit."""
+    """Numbers side by side, each on its way to its limit: a yardstick, and the number; the same by
+    other parameters, None where there is none or it reads the same."""
 
-    scales: tuple[Scale, ...]
+    scales: tuple[tuple[Yardstick, float, float | None], ...]
 
 
 @dataclass(frozen=True)

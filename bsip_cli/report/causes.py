@@ -55,13 +55,11 @@ class EffectWords:
         return f"{self.meaning} {self.action}"
 
 
-def _words_of(title: str, follows: str, usual: Mapping[str, Any] | None = None, **more: Any) -> Any:
-    sizes = Usual(**usual) if usual else None
-    return EffectWords(title, follows, **_WORDS["follows"][follows], usual=sizes, **more)
-
-
-EFFECT_WORDS: dict[str, EffectWords] = {n: _words_of(**x) for n, x in _WORDS["causes"].items()}
-USUAL = {name: words.usual for name, words in EFFECT_WORDS.items() if words.usual}
+USUAL = {name: Usual(**x["usual"]) for name, x in _WORDS["causes"].items() if "usual" in x}
+EFFECT_WORDS = {
+    name: EffectWords(**about | _WORDS["families"][about["family"]] | {"usual": USUAL.get(name)})
+    for name, about in _WORDS["causes"].items()
+}
 
 
 def effect_title(effect: str) -> str:

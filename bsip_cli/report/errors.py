@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Scale
 from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, say
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, SAME_WITHIN
@@ -186,13 +185,22 @@ class Yardstick:
             return "bad: large"
         return "good" if value <= self.good else "acceptable"
 
-    def scale(self, value: float) -> Scale:
-        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
-        end = ENDS_AT * self.limit
-        part = min(value / end, 1.0) if np.isfinite(value) else 0.0
-        words = self.title, f"{number(value)} {self.unit}", self.words(value)
-        marks, is_beyond = (f"{self.good:.2g}", number(self.limit, 0)), bool(value > end)
-        return Scale(*words, part, self.good / end, self.limit / end, *marks, is_beyond)
+    def shown(self, value: float) -> str:
+        return f"{number(value)} {self.unit}"
+
+    @property
+    def end(self) -> float:
+        """Of its scale, in every report the same."""
+        return ENDS_AT * self.limit
+
+    @property
+    def marks(self) -> tuple[tuple[float, str], tuple[float, str]]:
+        """Part of the scale, and text, of what is good and of what is large."""
+        return (self.good / self.end, f"{self.good:.2g}"), (1 / ENDS_AT, number(self.limit, 0))
+
+    def part(self, value: float) -> float:
+        """Of the scale; 0 of what is not known."""
+        return min(value / self.end, 1.0) if np.isfinite(value) else 0.0
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:

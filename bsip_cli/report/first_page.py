@@ -233,10 +233,10 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     if recordings.om_waits(record):
         first, other = other, first
         which = f"? ● {RM}, ○ {used}{later}"
-    scales = []
-    for one, size in first.items():
-        scale, beside = one.scale(size), one.scale(other[one])
-        scales.append(replace(scale, other=None if beside.shown == scale.shown else beside))
+    scales = [
+        (one, size, None if one.shown(other[one]) == one.shown(size) else other[one])
+        for one, size in first.items()
+    ]
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(errors.SOURCES, "note")

@@ -257,7 +257,7 @@ def _errors(record: ParticipantRecord) -> Iterator[Block]:
         changes = (of[m] / of[RM] - 1.0 if of[RM] > 0.0 else np.nan for m in (RM_MASS, OM))
         said = errors.one_number_alone(component_label("grf_vertical"), *changes)
         yield Paragraph(f"{said} RM+mass is {RM} times {number(factor.iloc[0], 3)}.")
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for trial, gain_of in by_trial.items():
         used = "" if next(iter(gain_of.values())).held_out else " (identified OM)"
         cells = (_error(gain_of.get(c), method) for c in _SHOWN for method in METHODS)

@@ -9,10 +9,20 @@ import pytest
 
 from bsip_cli.artifacts import read_header
 from bsip_cli.report.tables.build import IN_PRINT, NAMES, build_tables, show
-from bsip_cli.report.tables.formats import escape_latex as latex
-from bsip_cli.report.tables.formats import escape_markdown as markdown
-from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
-from bsip_cli.report.tables.model import Column, Row, Table, interval, mean_sd, number, p_value
+from bsip_cli.report.tables.model import (
+    Column,
+    Row,
+    Table,
+    interval,
+    mean_sd,
+    number,
+    p_value,
+    to_csv,
+    to_latex,
+    to_markdown,
+)
+from bsip_cli.report.tables.model import escape_latex as latex
+from bsip_cli.report.tables.model import escape_markdown as markdown
 from bsip_cli.report.tables.published import comparison_name
 from bsip_cli.statistics.cohort import Criteria
 

@@ -49,11 +49,10 @@ def test_pieces_know_their_kinds():
 @pytest.mark.parametrize(("value", "part", "beyond"), [(15.0, 0.25, False), (90.0, 1.0, True)])
 def test_scales_end_at_a_fixed_size(value, part, beyond):
     first, *others = yardsticks(0.03, 5.0)
-    scale = first.scale(value)
-    assert (scale.part, scale.is_beyond, scale.limit_part) == (part, beyond, 0.5)
-    assert {one.scale(one.limit).part for one in others} == {0.5}
-    assert ('class="arrow"' in page_of(Scales((scale,)))) == beyond
-    assert first.scale(np.nan).part == 0.0
+    assert first.part(value) == part and first.marks[1][0] == 0.5
+    assert {one.part(one.limit) for one in others} == {0.5}
+    assert ('class="arrow"' in page_of(Scales(((first, value, None),)))) == beyond
+    assert first.part(np.nan) == 0.0
 
 
 def test_abbreviations_of_tasks_are_spelled_out():

@@ -4,7 +4,6 @@ import hashlib
 import re
 from dataclasses import replace
 from datetime import date
-from html import unescape
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,7 +19,7 @@ from bsip_cli.report.recordings import large_finding, light_for
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
 from bsip_cli.report.words import number, with_spread
-from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs
+from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs, words_of
 
 FILE = "sub-01_task-static.c3d"
 TITLES = (
@@ -37,12 +36,6 @@ TITLES = (
 @pytest.fixture(scope="module")
 def page(reports) -> str:
     return reports.html("sub-01")
-
-
-def words_of(html: str) -> str:
-    """What a reader sees, with plain spaces."""
-    bare = re.sub(r"<style.*?</style>", " ", html, flags=re.S)
-    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", bare)))
 
 
 @pytest.fixture(scope="module")

@@ -12,17 +12,20 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from bsip_cli.report.tables import published
-from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
 from bsip_cli.report.tables.model import (
     AXES,
     TEXTS,
     Cell,
+    Column,
     Results,
     Row,
     Table,
     columns,
     columns_of,
     p_value,
+    to_csv,
+    to_latex,
+    to_markdown,
     unit_label,
 )
 from bsip_cli.report.words import segment_label
@@ -41,13 +44,21 @@ NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
 
 
 class Line(NamedTuple):
-    """A row in the making: its topic, what this is called in notes, the values that come from no
-    test of it, and the row's group."""
+    """A row in the making: its topic, what this is called in the row and in notes, the row's group,
+    and values that come from no test of it."""
 
     topic: Topic
     label: str
-    own: dict[str, Cell]
     group: str = ""
+    own: Mapping[str, Cell] | None = None
+
+    def values(self, results: Results, columns: Iterable[Column]) -> dict[str, Cell]:
+        """Of all columns that its table may have."""
+        name, reason = self.topic.variable, results.reasons(self.topic)
+        values: dict[str, Cell] = dict.fromkeys(("segment", "axis", "variable", "quantity"), name)
+        values |= {"task": self.topic.task, "role": self.topic.role, "component": name[:2]}
+        values |= {"label": self.label, "reason": reason}
+        return {**values, **results.values(self.topic, columns), **(self.own or {})}
 
 
 Marks = Callable[[Results, Topic, Criteria], dict[str, str]]
@@ -80,13 +91,8 @@ def _table(
     words |= {"ci": f"{100.0 * (1.0 - criteria.alpha):g}% CI"}
     found = columns_of(name, **words)
     rows = [
-        Row(
-            results.values(one.topic, found) | {"reason": results.reasons(one.topic)} | one.own,
-            one.topic.unit,
-            one.group,
-            marks(results, one.topic, criteria),
-        )
-        for one in lines
+        Row(x.values(results, found), x.topic.unit, x.group, marks(results, x.topic, criteria))
+        for x in lines
     ]
     tests = [results.find(one.topic, "paired_t") for one in lines] if tests is None else tests
     words |= _words(results, tests, criteria)
@@ -123,14 +129,13 @@ def _segment_mass(results: Results, criteria: Criteria) -> Table:
         if not (name := topic.variable).endswith(DATA_SHARE):
             of_share = replace(topic, variable=name + DATA_SHARE, unit="1")
             share = results.find(of_share, "description", OM, "")
-            own: dict[str, Cell] = {"segment": name, "mass_data_share": share.mean_a}
-            own["mass_data_share_sd"] = share.sd_a
-            lines.append(Line(topic, segment_label(name), own))
+            own = {"mass_data_share": share.mean_a, "mass_data_share_sd": share.sd_a}
+            lines.append(Line(topic, segment_label(name), own=own))
     return _table(NAMES[0], lines, (results, criteria))
 
 
 def _cop_rmse(results: Results, criteria: Criteria) -> Table:
-    lines = [Line(x, AXES[x.variable], {"axis": x.variable}) for x in results.topics]
+    lines = [Line(topic, AXES[topic.variable]) for topic in results.topics]
     table = _table(NAMES[1], lines, (results, criteria))
     if len({row.values["n"] for row in table.rows}) > 1:
         return table
@@ -155,10 +160,8 @@ def _marks_of_sway(results: Results, topic: Topic, criteria: Criteria) -> dict[s
 
 def _posturography(results: Results, criteria: Criteria) -> Table:
     """Sway of the measured and the simulated centre of pressure."""
-    lines = []
-    for topic in results.topics:
-        label = f"{TEXTS['sway'][topic.variable]} [{unit_label(topic.unit)}]"
-        lines.append(Line(topic, label, {"variable": topic.variable, "label": label}))
+    named = {t: f"{TEXTS['sway'][t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
+    lines = [Line(topic, label) for topic, label in named.items()]
     all_three = " / ".join((MEASURED, OM, RM)), ""
     tests = [results.find(topic, "one_way_anova", *all_three) for topic in results.topics]
     return _table(NAMES[2], lines, (results, criteria), tests, _marks_of_sway)
@@ -171,10 +174,9 @@ def _cross_validation(results: Results, criteria: Criteria) -> Table:
         results.topics, key=lambda t: (order.index(t.variable), t.role == "sequence", t.task)
     ):
         quantity = _QUANTITIES[topic.variable]
-        own: dict[str, Cell] = {"quantity": topic.variable, "task": topic.task}
-        own |= {"role": topic.role, "label": _task_label(topic)}
         group = f"{quantity} [{unit_label(topic.unit)}]"
-        lines.append(Line(topic, f"{quantity}, {topic.task}", own, group))
+        own = {"label": _task_label(topic)}
+        lines.append(Line(topic, f"{quantity}, {topic.task}", group, own))
     return _table(NAMES[3], lines, (results, criteria))
 
 
@@ -193,18 +195,17 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
     lines: list[Line] = []
     named: dict[Topic, str] = {}
     for topic in errors:
-        component, r = topic.variable[:2], _sibling(topic, "r")
-        label = f"{component.capitalize()}, {topic.task}"
+        component, r = topic.variable[:2].capitalize(), _sibling(topic, "r")
+        label = f"{component}, {topic.task}"
         named |= dict.fromkeys((topic, r), label)
-        of_topic: dict[str, Cell] = {"task": topic.task, "role": topic.role, "component": component}
-        of_topic["n"] = results.find(topic, "paired_t").n
         tests = results.values(topic, of_error) | results.values(r, of_r)
-        tests["label"] = f"{component.capitalize()} [{unit_label(topic.unit)}]"
+        tests["label"] = f"{component} [{unit_label(topic.unit)}]"
         tests["reason"] = all_reasons(results.reasons(topic), results.reasons(r))
         for method in (OM, RM, RM_MASS):
             own = tests if method == OM else dict.fromkeys(tests, "")
-            own = of_topic | {"method": method} | own | _means_of_six(results, topic, method)
-            lines.append(Line(topic, label, own, _task_label(topic)))
+            more: dict[str, Cell] = {"method": method, "n": results.find(topic, "paired_t").n}
+            means = _means_of_six(results, topic, method)
+            lines.append(Line(topic, label, _task_label(topic), {**own, **more, **means}))
     given = results, criteria
     return _table(NAMES[4], lines, given, marks=lambda *_: {}, named=named, differ=differ)
 
@@ -239,13 +240,12 @@ def _centres_of_mass(results: Results, criteria: Criteria) -> Table:
         name = topic.variable.removeprefix(_COM)
         whose = _RESIDUALS.get(name) or _OVER_SEGMENTS.get(name) or segment_label(name)
         label = f"{whose} [{unit_label(topic.unit)}]"
-        own: dict[str, Cell] = {"variable": topic.variable, "label": label}
-        if is_residual := topic.variable in _RESIDUALS:
+        if topic.variable in _RESIDUALS:
             tests.append(results.find(topic, "paired_t"))
+            lines.append(Line(topic, label, "Residual"))
         else:
-            own["n"] = results.find(topic, "description", DIFFERENCE, "").n
-        group = "Residual" if is_residual else "Centres of mass along the segments"
-        lines.append(Line(topic, label, own, group))
+            n = results.find(topic, "description", DIFFERENCE, "").n
+            lines.append(Line(topic, label, "Centres of mass along the segments", {"n": n}))
     printed = "; ".join(_in_print())
     return _table(NAMES[5], lines, (results, criteria), tests, in_print=printed)
 

@@ -39,7 +39,7 @@ from bsip_cli.report.cohort_record import (
 )
 from bsip_cli.report.figures.charts import Strip, gain_dots, strips
 from bsip_cli.report.records import how_made
-from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
+from bsip_cli.report.tables.build import IN_PRINT, TAGS
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.verdict import probability_of
 from bsip_cli.report.words import (
@@ -426,7 +426,7 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
         yield Links("The tables as files:", tuple((name, of[0][1]) for name, of in files.items()))
     else:
         yield Paragraph("All tests, and how each was made, are in the files.", "note")
-        for tag, table in zip(BUILDERS, record.tables, strict=False):
+        for tag, table in zip(TAGS, record.tables, strict=False):
             yield Heading(table.title)
             if tag in IN_PRINT:
                 yield from _table(table)

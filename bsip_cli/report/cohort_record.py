@@ -14,7 +14,7 @@ from bsip_cli.report.blocks import Light
 from bsip_cli.report.causes import Candidate, Cause, candidates_of, causes_of
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
-from bsip_cli.report.words import COMPONENTS, TEXTS, capital, listing, number, task_of
+from bsip_cli.report.words import COMPONENTS, TEXTS, listing, number, say, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
@@ -191,17 +191,23 @@ def _in_words(
     asked = len(of_each)
     if not tasks.isdisjoint(set().union(*of_each.values())):
         asked = sum(not tasks.isdisjoint(own) or p in of for p, own in of_each.items())
-    is_all_unsure = len(unsure) == len(of)
-    where = f"{'possibly ' * is_all_unsure}in {len(of)} of {asked} participants"
-    where += f" ({named_people([*of])})" if len(of) < asked else ""
-    text = f"{capital(label)}: {where}{_sizes([one.main_number() for one in every])}"
-    which = "all of them" if is_all_unsure else named_people(unsure)
-    return f"{text}; one of several that look alike in {which}." if unsure else f"{text}."
+    known = [one.main_number() for one in every]
+    return say(
+        "shared",
+        label=label,
+        of=len(of),
+        asked=asked,
+        who=named_people([*of]),
+        sizes=_sizes([n for n in known if n is not None]) if None not in known else "",
+        unsure=len(unsure),
+        which="all of them" if len(unsure) == len(of) else named_people(unsure),
+    )
 
 
-def _sizes(numbers: Sequence[Number | None]) -> str:
-    known = [n for n in numbers if n is not None]
-    if len(known) < len(numbers) or len({n.name for n in known}) > 1:
+def _sizes(known: Sequence[Number]) -> str:
+    """From the least to the largest, and whether they may be one; empty where they are of several
+    parameters."""
+    if len({n.name for n in known}) > 1:
         return ""
     factor, unit = readable_unit(known[0].name, known[0].unit)
     values = factor * np.array([n.value for n in known])

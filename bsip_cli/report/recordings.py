@@ -167,22 +167,26 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells; nothing
     where the light says it."""
     part, is_left = main_part(record)
-    title = light_for(record).title
-    if part is None:
-        if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
-            return "other findings explain part at most"
-        if verdict.OF_IT_UNKNOWN in title:
-            return "" if record.causes else verdict.NONE_FOUND
-        return verdict.CAUSE_UNKNOWN + ("" if record.causes else f": {verdict.NONE_FOUND}")
-    besides = " besides the table's parameters" if is_left else ""
-    if number_of := _number_of(record, part):
-        return f"the largest part{besides} is finding {number_of}"
-    return "" if part.label in title else f"the largest part{besides} is {part.label}"
+    is_found = worst is not None and any(_concerns(cause, worst) for cause in record.causes)
+    return say(
+        "why_large",
+        part=part.label if part else "",
+        number=_number_of(record, part) if part else 0,
+        besides=" besides the table's parameters" if is_left else "",
+        other_findings=is_found,
+        any_finding=bool(record.causes),
+        title=light_for(record).title,
+        none_found=verdict.NONE_FOUND,
+    )
 
 
 def main_part(record: ParticipantRecord) -> tuple[Piece | None, bool]:
-    """As `verdict.main_part`, of this person."""
-    return verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    """Of a large error, what makes the largest part; None if unknown, so that nothing is of unknown
+    cause whose bar has no such part. And whether that is what OM has left."""
+    found = effects_in(record.causes)
+    ranked, is_left = verdict.ranked_parts(record.budget, found, record.use())
+    is_known = bool(ranked) and ranked[0].label not in verdict.NO_CAUSE
+    return (ranked[0] if is_known else None), is_left
 
 
 def numbered(record: ParticipantRecord) -> dict[int, Cause]:

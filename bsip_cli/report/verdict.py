@@ -47,9 +47,7 @@ _MOST_MEMBERS = 2  # of a group, in a line with their sizes
 _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
-CAUSE_UNKNOWN = "cause unknown"
-OF_IT_UNKNOWN = "of it unknown"
-_NO_CAUSE = (UNKNOWN, NOISE)
+NO_CAUSE = (UNKNOWN, NOISE)  # as labels of parts
 NONE_FOUND = f"none of the {len(EFFECTS)} faults that bsip knows was found"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
@@ -165,39 +163,16 @@ def light_of(
 def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
     """Of a large error, what makes most of it, one part or two: ``, most of it soft tissue (56 %)``;
     else the largest part. Errors with identified parameters are not the table's."""
-    ranked, is_left = _ranked(budget, found, use)
-    if is_left:
-        return " even with OM"
-    first, second = [*ranked, None, None][:2]
-    if first is None or first.label in _NO_CAUSE:
-        if first is not None and first.label == UNKNOWN and first.share <= 50.0:
-            return f", {number(first.share, 0)} % {OF_IT_UNKNOWN}"
-        return f", {CAUSE_UNKNOWN}"
-    if first.share >= 100.0:  # what another part takes off again is beyond the whole
-        return f", all of it {first.label}"
-    said = f"{first.label} ({number(first.share, 0)} %)"
-    if first.share > 50.0:
-        return f", most of it {said}"
-    if second is None or second.label in _NO_CAUSE or first.share + second.share <= 50.0:
-        return f", the largest part of it {said}"
-    return f", most of it {said} and {second.label} ({number(second.share, 0)} %)"
+    ranked, is_left = ranked_parts(budget, found, use)
+    parts = [(one.label, one.share) for one in ranked[:2]] + [("", 0.0)] * 2
+    return say("mostly", is_left=is_left, parts=parts, nameless=("", *NO_CAUSE))
 
 
-def main_part(
-    budget: pd.DataFrame | None, found: Collection[str], use: str = RM
-) -> tuple[Piece | None, bool]:
-    """Of a large error with the method ``use``, what makes the largest part; None if unknown, so
-    that nothing is of unknown cause whose bar has no such part. And whether that is only what the
-    table's parameters leave, which OM should have taken away."""
-    ranked, is_left = _ranked(budget, found, use)
-    is_known = bool(ranked) and ranked[0].label not in _NO_CAUSE
-    return (ranked[0] if is_known else None), is_left
-
-
-def _ranked(
+def ranked_parts(
     budget: pd.DataFrame | None, found: Collection[str], use: str
 ) -> tuple[list[Piece], bool]:
-    """The parts of `main_part`, the largest first, and whether they are what OM has left."""
+    """What makes a large error with the method ``use``, the largest part first, and whether that is
+    only what the table's parameters leave, which OM should have taken away."""
     parts = () if budget is None or budget.empty else budgets.overall_pieces(budget, found)
     whole = [one for one in parts if one.label != budgets.REST]  # which has no name
     ranked = sorted(whole, key=lambda one: -one.share)

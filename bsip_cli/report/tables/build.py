@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isnan
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -76,29 +76,36 @@ def _sign(row: Comparison, criteria: Criteria, sign: str = "*") -> str:
     return sign if row.p_value < criteria.alpha else ""
 
 
-def _table(
-    name: str,
-    lines: Sequence[Line],
-    given: tuple[Results, Criteria],
-    tests: Sequence[Comparison] | None = None,
-    marks: Marks = _stars,
-    named: Mapping[Topic, str] | None = None,
-    **words: str,
-) -> Table:
-    """``tests``: whose numbers the legend sums up, if not those of OM against RM; ``named``: what
-    topics are called, if not those of the lines; ``words``: what only this table says."""
-    results, criteria = given
-    words |= {"ci": f"{100.0 * (1.0 - criteria.alpha):g}% CI"}
-    found = columns_of(name, **words)
-    rows = [
-        Row(x.values(results, found), x.topic.unit, x.group, marks(results, x.topic, criteria))
-        for x in lines
-    ]
-    tests = [results.find(one.topic, "paired_t") for one in lines] if tests is None else tests
-    words |= _words(results, tests, criteria)
-    texts = [text.format(**words) for text in (TEXTS[name]["title"], *TEXTS[name]["notes"])]
-    texts += _not_possible(results, named or {one.topic: one.label for one in lines})
-    return Table(name, texts[0], found, tuple(rows), tuple(filter(None, texts[1:])))
+@dataclass(frozen=True)
+class Made:
+    """What a table is made of: its name, the tests, and the options with which they were made."""
+
+    name: str
+    results: Results
+    criteria: Criteria
+
+    def table(
+        self,
+        lines: Sequence[Line],
+        tests: Sequence[Comparison] | None = None,
+        marks: Marks = _stars,
+        named: Mapping[Topic, str] | None = None,
+        **words: str,
+    ) -> Table:
+        """``tests``: whose numbers the legend sums up, if not those of OM against RM; ``named``:
+        what topics are called, if not those of the lines; ``words``: what only this table says."""
+        results, criteria, texts = self.results, self.criteria, TEXTS[self.name]
+        words |= {"ci": f"{100.0 * (1.0 - criteria.alpha):g}% CI"}
+        found = columns_of(self.name, **words)
+        rows = [
+            Row(x.values(results, found), x.topic.unit, x.group, marks(results, x.topic, criteria))
+            for x in lines
+        ]
+        paired = [results.find(one.topic, "paired_t") for one in lines]
+        words |= _words(results, paired if tests is None else tests, criteria)
+        title, *notes = (text.format(**words) for text in (texts["title"], *texts["notes"]))
+        notes += _not_possible(results, named or {one.topic: one.label for one in lines})
+        return Table(self.name, title, found, tuple(rows), tuple(filter(None, notes)))
 
 
 # --- the tables -----------------------------------------------------------------------------------
@@ -123,20 +130,20 @@ def _task_label(topic: Topic) -> str:
     return topic.task + identified * (topic.role == "sequence")
 
 
-def _segment_mass(results: Results, criteria: Criteria) -> Table:
+def _segment_mass(made: Made) -> Table:
     lines = []
-    for topic in sorted(results.topics, key=lambda topic: _segment_rank(topic.variable)):
+    for topic in sorted(made.results.topics, key=lambda topic: _segment_rank(topic.variable)):
         if not (name := topic.variable).endswith(DATA_SHARE):
             of_share = replace(topic, variable=name + DATA_SHARE, unit="1")
-            share = results.find(of_share, "description", OM, "")
+            share = made.results.find(of_share, "description", OM, "")
             own = {"mass_data_share": share.mean_a, "mass_data_share_sd": share.sd_a}
             lines.append(Line(topic, segment_label(name), own=own))
-    return _table(NAMES[0], lines, (results, criteria))
+    return made.table(lines)
 
 
-def _cop_rmse(results: Results, criteria: Criteria) -> Table:
-    lines = [Line(topic, AXES[topic.variable]) for topic in results.topics]
-    table = _table(NAMES[1], lines, (results, criteria))
+def _cop_rmse(made: Made) -> Table:
+    lines = [Line(topic, AXES[topic.variable]) for topic in made.results.topics]
+    table = made.table(lines)
     if len({row.values["n"] for row in table.rows}) > 1:
         return table
     return replace(table, columns=tuple(c for c in table.columns if c.fields != ("n",)))
@@ -158,26 +165,26 @@ def _marks_of_sway(results: Results, topic: Topic, criteria: Criteria) -> dict[s
     return marks
 
 
-def _posturography(results: Results, criteria: Criteria) -> Table:
+def _posturography(made: Made) -> Table:
     """Sway of the measured and the simulated centre of pressure."""
-    named = {t: f"{TEXTS['sway'][t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
+    named = {t: f"{TEXTS['sway'][t.variable]} [{unit_label(t.unit)}]" for t in made.results.topics}
     lines = [Line(topic, label) for topic, label in named.items()]
     all_three = " / ".join((MEASURED, OM, RM)), ""
-    tests = [results.find(topic, "one_way_anova", *all_three) for topic in results.topics]
-    return _table(NAMES[2], lines, (results, criteria), tests, _marks_of_sway)
+    tests = [made.results.find(topic, "one_way_anova", *all_three) for topic in made.results.topics]
+    return made.table(lines, tests, _marks_of_sway)
 
 
-def _cross_validation(results: Results, criteria: Criteria) -> Table:
+def _cross_validation(made: Made) -> Table:
     """Errors of the centre of pressure and of the vertical force by movement."""
     order, lines = list(_QUANTITIES), []
     for topic in sorted(
-        results.topics, key=lambda t: (order.index(t.variable), t.role == "sequence", t.task)
+        made.results.topics, key=lambda t: (order.index(t.variable), t.role == "sequence", t.task)
     ):
         quantity = _QUANTITIES[topic.variable]
         group = f"{quantity} [{unit_label(topic.unit)}]"
         own = {"label": _task_label(topic)}
         lines.append(Line(topic, f"{quantity}, {topic.task}", group, own))
-    return _table(NAMES[3], lines, (results, criteria))
+    return made.table(lines)
 
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -185,10 +192,10 @@ _MEASURES = {"rmse": "rmse", "pearson_r": "r", "schwer_m": "m", "schwer_p": "p",
 """Measure of the data: its name in the CSV."""
 
 
-def _six_components(results: Results, criteria: Criteria) -> Table:
+def _six_components(made: Made) -> Table:
     """The components of the ground wrench, movement by movement (Hansen 2014); tests stand in OM's
     row, those of the other methods leave them empty."""
-    errors = [topic for topic in results.topics if topic.variable.endswith("_rmse")]
+    errors = [topic for topic in made.results.topics if topic.variable.endswith("_rmse")]
     errors.sort(key=lambda t: (t.role == "sequence", t.task, _COMPONENTS.index(t.variable[:2])))
     differ = "r differs OM : RM"
     of_error, of_r = columns("smaller_of_six"), columns("correlations", differ=differ)
@@ -198,16 +205,15 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
         component, r = topic.variable[:2].capitalize(), _sibling(topic, "r")
         label = f"{component}, {topic.task}"
         named |= dict.fromkeys((topic, r), label)
-        tests = results.values(topic, of_error) | results.values(r, of_r)
+        tests = made.results.values(topic, of_error) | made.results.values(r, of_r)
         tests["label"] = f"{component} [{unit_label(topic.unit)}]"
-        tests["reason"] = all_reasons(results.reasons(topic), results.reasons(r))
+        tests["reason"] = all_reasons(made.results.reasons(topic), made.results.reasons(r))
         for method in (OM, RM, RM_MASS):
             own = tests if method == OM else dict.fromkeys(tests, "")
-            more: dict[str, Cell] = {"method": method, "n": results.find(topic, "paired_t").n}
-            means = _means_of_six(results, topic, method)
+            more: dict[str, Cell] = {"method": method, "n": made.results.find(topic, "paired_t").n}
+            means = _means_of_six(made.results, topic, method)
             lines.append(Line(topic, label, _task_label(topic), {**own, **more, **means}))
-    given = results, criteria
-    return _table(NAMES[4], lines, given, marks=lambda *_: {}, named=named, differ=differ)
+    return made.table(lines, marks=lambda *_: {}, named=named, differ=differ)
 
 
 def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell]:
@@ -226,7 +232,7 @@ def _sibling(topic: Topic, measure: str) -> Topic:
     return replace(topic, variable=topic.variable[:3] + measure, unit="1")
 
 
-def _centres_of_mass(results: Results, criteria: Criteria) -> Table:
+def _centres_of_mass(made: Made) -> Table:
     """What identification changes, as Robert 2017 compares it."""
     order = [*_RESIDUALS, *(_COM + name for name in _OVER_SEGMENTS)]
 
@@ -236,18 +242,18 @@ def _centres_of_mass(results: Results, criteria: Criteria) -> Table:
         return place, _segment_rank(topic.variable.removeprefix(_COM))
 
     lines, tests = [], []
-    for topic in sorted(results.topics, key=rank):
+    for topic in sorted(made.results.topics, key=rank):
         name = topic.variable.removeprefix(_COM)
         whose = _RESIDUALS.get(name) or _OVER_SEGMENTS.get(name) or segment_label(name)
         label = f"{whose} [{unit_label(topic.unit)}]"
         if topic.variable in _RESIDUALS:
-            tests.append(results.find(topic, "paired_t"))
+            tests.append(made.results.find(topic, "paired_t"))
             lines.append(Line(topic, label, "Residual"))
         else:
-            n = results.find(topic, "description", DIFFERENCE, "").n
+            n = made.results.find(topic, "description", DIFFERENCE, "").n
             lines.append(Line(topic, label, "Centres of mass along the segments", {"n": n}))
     printed = "; ".join(_in_print())
-    return _table(NAMES[5], lines, (results, criteria), tests, in_print=printed)
+    return made.table(lines, tests, in_print=printed)
 
 
 def _in_print() -> Iterator[str]:
@@ -312,23 +318,17 @@ def _named(names: Sequence[str], comma: str = ", ") -> str:
 
 # --- all of them ----------------------------------------------------------------------------------
 
-BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
-    "table1": _segment_mass,
-    "table2": _cop_rmse,
-    "table3": _posturography,
-    "table4": _cross_validation,
-    "table5": _six_components,
-    "table6": _centres_of_mass,
+BUILDERS: dict[str, Callable[[Made], Table]] = {
+    "table1_segment_mass": _segment_mass,
+    "table2_cop_rmse": _cop_rmse,
+    "table3_posturography": _posturography,
+    "table4_cross_validation": _cross_validation,
+    "table5_six_components": _six_components,
+    "table6_centres_of_mass": _centres_of_mass,
 }
-IN_PRINT = ("table1", "table2", "table3", "table4")
-NAMES = (
-    "table1_segment_mass",
-    "table2_cop_rmse",
-    "table3_posturography",
-    "table4_cross_validation",
-    "table5_six_components",
-    "table6_centres_of_mass",
-)
+NAMES = tuple(BUILDERS)
+TAGS = tuple(name.partition("_")[0] for name in NAMES)
+IN_PRINT = TAGS[:4]
 RENDERERS: dict[str, Callable[[Table], str]] = {"csv": to_csv, "md": to_markdown, "tex": to_latex}
 
 
@@ -345,13 +345,13 @@ def build_tables(
     fitted_on : what each task's data were to OM, as a fact of the values: ``table``, ``task``,
         ``role``, and of how many participants (``everyone``) OM was fitted to them
         (``identification``).
-    missing : who is not in which tables: ``sentence`` and ``tables`` (as in `BUILDERS`).
+    missing : who is not in which tables: ``sentence`` and ``tables`` (as in `TAGS`).
     """
     rows = [Comparison.from_row(row) for row in comparisons.to_dict("records")]
-    of_table = {tag: Results(row for row in rows if row.topic.table == tag) for tag in BUILDERS}
+    of_table = {tag: Results(row for row in rows if row.topic.table == tag) for tag in TAGS}
     tables = []
-    for tag, build in BUILDERS.items():
-        table = build(of_table[tag], criteria)
+    for tag, (name, build) in zip(TAGS, BUILDERS.items(), strict=True):
+        table = build(Made(name, of_table[tag], criteria))
         notes = [*table.notes, *_fitted_on(one for one in fitted_on if one["table"] == tag)]
         if absent := [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]:
             notes.append(f"Missing: {_named(absent, '; ')}.")

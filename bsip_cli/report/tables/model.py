@@ -3,8 +3,6 @@ numbers as the papers print them; a number that is not there is a dash."""
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 import tomllib
 from collections import defaultdict
@@ -14,6 +12,8 @@ from functools import partial
 from itertools import groupby
 from math import isnan
 from pathlib import Path
+
+import pandas as pd
 
 from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import Comparison, Topic, all_reasons
@@ -130,36 +130,24 @@ def unit_label(unit: str) -> str:
     return {"mm2": "mm²", "% body weight": "% BW"}.get(unit, unit)
 
 
-def _rounded(value: float, decimals: int) -> str:
+def number(value: float, decimals: int = 2) -> str:
+    """Without a sign before zero."""
     if isnan(value):
         return ABSENT
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def number(decimals: int) -> Callable[[float], str]:
-    """A form with so many decimals, without a sign before zero."""
-    return partial(_rounded, decimals=decimals)
-
-
-def mean_sd(decimals: int) -> Callable[[float, float], str]:
+def mean_sd(mean: float, sd: float, decimals: int = 2) -> str:
     """M(SD), in whole numbers from a thousand on; one participant has no SD."""
-
-    def form(mean: float, sd: float) -> str:
-        places = number(0 if abs(mean) >= 1000.0 else decimals)
-        return ABSENT if isnan(mean) else f"{places(mean)}({places(sd)})"
-
-    return form
+    digits = 0 if abs(mean) >= 1000.0 else decimals
+    return ABSENT if isnan(mean) else f"{number(mean, digits)}({number(sd, digits)})"
 
 
-def interval(decimals: int) -> Callable[[float, float], str]:
-    """A form of both ends in brackets; absent if one is."""
-
-    def form(low: float, high: float) -> str:
-        ends = [_rounded(end, decimals) for end in (low, high)]
-        return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
-
-    return form
+def interval(low: float, high: float) -> str:
+    """Both ends in brackets; absent if one is."""
+    ends = number(low), number(high)
+    return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
 
 
 def p_value(p: float) -> str:
@@ -177,12 +165,12 @@ def counts_of(a: float, b: float, n: float) -> str:
 AXES = {"cop_ap": "AP", "cop_ml": "ML"}
 FORMS: dict[str, Callable[..., str]] = {
     "": str,
-    "number": number(2),
-    "interval": interval(2),
-    "mean_sd": mean_sd(2),
-    "mean_sd of 1": mean_sd(3),
+    "number": number,
+    "interval": interval,
+    "mean_sd": mean_sd,
+    "mean_sd of 1": partial(mean_sd, decimals=3),
     "p": p_value,
-    "count": number(0),
+    "count": partial(number, decimals=0),
     "counts": counts_of,
     "segment": segment_label,
     "axis": AXES.__getitem__,
@@ -231,19 +219,11 @@ def to_csv(table: Table) -> str:
         for name in column.fields
     ]
     lines = [
-        [_text(row.values[name]) if unit in (None, row.unit) else "" for name, unit in fields]
+        [row.values[name] if unit in (None, row.unit) else "" for name, unit in fields]
         for row in table.rows
     ]
     head = [name if unit is None else name + _SUFFIXES[unit] for name, unit in fields]
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows([head, *lines])
-    return stream.getvalue()
-
-
-def _text(value: Cell) -> str:
-    if isinstance(value, float):
-        return "" if isnan(value) else repr(float(value))
-    return str(value)
+    return pd.DataFrame(lines, columns=head, dtype=object).to_csv(index=False, lineterminator="\n")
 
 
 _NAMED = {"\\": "backslash", "~": "asciitilde", "^": "asciicircum"}

@@ -18,10 +18,10 @@ from markupsafe import Markup
 
 from bsip_cli.errors import printable
 from bsip_cli.report.budget import Piece, fills
+from bsip_cli.report.errors import Yardstick
 from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
-    from bsip_cli.report.errors import Yardstick
     from bsip_cli.report.figures.canvas import Figure
 
 Mark = Literal["", "better", "warning", "group"]

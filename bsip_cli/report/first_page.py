@@ -116,12 +116,11 @@ def _recorded(record: ParticipantRecord) -> str:
 
 def _files(record: ParticipantRecord) -> str:
     """Names of few; of many how many there are, and how they begin and end."""
-    stems, begin = tuple(f"{trial.stem}." for trial in record.trials), f"{record.id}_"
+    stems = tuple(f"{trial.stem}." for trial in record.trials)
     names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
-    if len(names) > _MOST_FILES:
-        kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
-        return f"{len(names)} ({begin}*{listing(kinds)})"
-    return listing(names)
+    kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
+    many = f"{len(names)} ({record.id}_*{listing(kinds)})"
+    return many if len(names) > _MOST_FILES else listing(names)
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -133,11 +132,11 @@ def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
 
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
     how = anterior, record.body_weight(), _POSES
-    moved = [(one, one.kinematics) for one in record.trials if one.kinematics is not None]
     found = [
         (trial, pose)
-        for trial, kinematics in moved
-        for pose in poses_of(record.body, kinematics, trial.reconstruction, *how)
+        for trial in record.trials
+        if trial.kinematics is not None
+        for pose in poses_of(record.body, trial.kinematics, trial.reconstruction, *how)
     ]
     if not found:
         return ()

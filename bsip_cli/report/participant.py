@@ -67,8 +67,8 @@ _CAPTIONS: dict[str, str] = TEXTS["captions"]
 
 def participant_document(record: ParticipantRecord) -> Document:
     """The page of one person."""
-    made = [Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))]
-    made += records.how_made(records.HowMade.of(record.origins), record.defaults)
+    cannot = Heading("What cannot be known"), Bullets(tuple(TEXTS["cannot_know"]))
+    how_made = records.how_made(records.HowMade.of(record.origins), record.defaults)
     errors_of_forces = (*_over_time(record), *_budget(record), *_errors(record))
     parameters = (*_choice(record), *_masses(record), *_next(record))
     sections = {
@@ -77,7 +77,7 @@ def participant_document(record: ParticipantRecord) -> Document:
         ("joints", "What does it change at the joints?"): joint_blocks(record),
         ("parameters", "Which segment parameters come out?"): parameters,
         ("recording", "What was recorded?"): _recording(record),
-        ("made", "How was it made, and what can it not know?"): made,
+        ("made", "How was it made, and what can it not know?"): (*cannot, *how_made),
     }
     return Document(
         title=f"{record.id}: do force plates and markers agree?",

@@ -209,27 +209,26 @@ class HowMade:
         return float(next(iter(self.options.get(option, ())), otherwise))
 
 
-def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
+def how_made(made: HowMade, defaults: Mapping[str, Any]) -> Iterator[Block]:
     """Warnings, versions, options that differ from the shipped ones, and the recordings with the
     start of their hashes."""
     said = [
         f"{stage}{f' ({unit})' if unit else ''}: {labelled(text)}"
         for stage, unit, text in made.messages
     ]
-    blocks: list[Block] = [Heading("Warnings")]
+    yield Heading("Warnings")
     nothing = (Paragraph("No stage had anything to warn of."),)
-    blocks += first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
+    yield from first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
     shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
+    yield Heading("Options that differ from the shipped ones")
     differ = Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items())))
-    blocks += [Heading("Options that differ from the shipped ones")]
-    blocks += [differ if changed else Paragraph("None.")]
+    yield differ if changed else Paragraph("None.")
     versions = (f"{name} {' / '.join(sorted(v))}" for name, v in sorted(made.versions.items()))
-    blocks += [Heading("Versions"), Paragraph(", ".join(versions))]
+    yield from (Heading("Versions"), Paragraph(", ".join(versions)))
     if made.files:
         rows = tuple((name, made.files[name][:_HASH_DIGITS]) for name in sorted(made.files))
-        blocks.append(Grid(("file read", "SHA-256 (start)"), rows, words=2))
-    return blocks
+        yield Grid(("file read", "SHA-256 (start)"), rows, words=2)
 
 
 def flat(options: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

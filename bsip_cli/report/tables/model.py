@@ -1,5 +1,5 @@
-"""A table as data and as text (CSV, LaTeX, Markdown), the tests of one table by what they are about, and
-numbers as the papers print them; a number that is not there is a dash."""
+"""A table as data and as text (CSV, LaTeX, Markdown), the tests of one table by what they are about,
+and numbers as the papers print them; a number that is not there is a dash."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ def papers(what: str, paper: str | None) -> Iterator[str]:
 
     UsageError: there is no such paper.
     """
-    from bsip_cli.report.tables.formats import to_markdown  # heavy, with those below
+    from bsip_cli.report.tables.model import to_markdown  # heavy, with those below
     from bsip_cli.report.tables.published import audited, printed
     from bsip_cli.statistics.published import load_paper, names
 

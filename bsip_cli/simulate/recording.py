@@ -12,14 +12,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.segments import without_side
-from bsip_cli.simulate.balance import balanced
+from bsip_cli.simulate.balance import balanced, ground_wrench
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing, tissue_of
-from bsip_cli.simulate.movements import MOVEMENTS
+from bsip_cli.simulate.moving import MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
-from bsip_cli.simulate.people import SIDES, Person
+from bsip_cli.simulate.people import SIDES, Marker, Person, Swing, tissue_of
 from bsip_cli.simulate.plan import STEP_S, Plan, Poses
 
 THIN = 4  # trials without flight are balanced at 250 Hz and interpolated

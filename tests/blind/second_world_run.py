@@ -19,8 +19,7 @@ from tqdm import tqdm
 
 from tests.blind.blind_running import ROOT, STAGES, TABLES, CommandError, run_pipeline
 from tests.blind.blind_tables import markdown, write_csv
-from tests.blind.second_world.drawn_people import drawn_cases
-from tests.blind.second_world.people import CASES, Case
+from tests.blind.second_world.people import CASES, Case, drawn_cases
 from tests.blind.second_world.study import PERSON, drawn, write_study
 
 NOTHING = "nothing"

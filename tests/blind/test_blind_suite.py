@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.blind.blind_batch import Batch, run_batch
 from tests.blind.blind_cases import CATALOGUE, short_suite
+from tests.blind.blind_long import Batch, run_batch
 from tests.blind.blind_running import STAGES
 from tests.blind.blind_scoring import (
     FOUND,

@@ -6,9 +6,8 @@ the feet until the centre of pressure follows the weight that the feet are to ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -25,15 +24,17 @@ _CART_HEIGHT = 0.95  # of the table-cart model's mass, for a person of the table
 _LEAST_SHARE = 0.015  # of the weight on the lighter foot
 
 
-class Load(Protocol):
-    """Something that the ground has to carry besides the body."""
+OnGround = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Times (N,) [s] and the velocity (N, 3) of a place [m/s] to the ground force (N, 3) [N]."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Something that the ground has to carry besides the body; place_m (3,) in the segment."""
 
     segment: str
-    place_m: np.ndarray  # (3,) in the segment's frame
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Additional ground force (N, 3) [N]; velocity (N, 3) of the place [m/s]."""
-        ...
+    place_m: np.ndarray
+    on_ground: OnGround
 
 
 @dataclass(frozen=True)

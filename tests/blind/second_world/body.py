@@ -14,8 +14,10 @@ deviations from theirs, not a fault of a recording.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -43,32 +45,21 @@ class Row:
     length_mm: float
 
 
+def rows_of(name: str) -> list[dict[str, str]]:
+    """Of a table of this folder."""
+    text = Path(__file__).with_name(name).read_text("utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def _row(row: dict[str, str]) -> Row:
+    mass, com, x, y, z, length_mm = (float(number) for number in list(row.values())[2:])
+    return Row(mass, com, (x, y, z), length_mm)
+
+
 STATURE_M = {"M": 1.741, "F": 1.735}
 TABLE = {
-    "M": {
-        "head": Row(6.94, 50.02, (30.3, 31.5, 26.1), 242.9),
-        "upper_trunk": Row(15.96, 29.99, (71.6, 45.4, 65.9), 170.7),
-        "middle_trunk": Row(16.33, 45.02, (48.2, 38.3, 46.8), 215.5),
-        "lower_trunk": Row(11.17, 61.15, (61.5, 55.1, 58.7), 145.7),
-        "upper_arm": Row(2.71, 57.72, (28.5, 26.9, 15.8), 281.7),
-        "forearm": Row(1.62, 45.74, (27.6, 26.5, 12.1), 268.9),
-        "hand": Row(0.61, 79.00, (62.8, 51.3, 40.1), 86.2),
-        "thigh": Row(14.16, 40.95, (32.9, 32.9, 14.9), 422.2),
-        "shank": Row(4.33, 43.95, (25.1, 24.6, 10.2), 440.3),
-        "foot": Row(1.37, 44.15, (25.7, 24.5, 12.4), 258.1),
-    },
-    "F": {
-        "head": Row(6.68, 48.41, (27.1, 29.5, 26.1), 243.7),
-        "upper_trunk": Row(15.45, 20.77, (74.6, 50.2, 71.8), 146.5),
-        "middle_trunk": Row(14.65, 45.12, (43.3, 35.4, 41.5), 211.0),
-        "lower_trunk": Row(12.47, 49.20, (43.3, 40.2, 44.4), 187.0),
-        "upper_arm": Row(2.55, 57.54, (27.8, 26.0, 14.8), 275.1),
-        "forearm": Row(1.38, 45.59, (26.1, 25.7, 9.4), 264.3),
-        "hand": Row(0.56, 74.74, (53.1, 45.4, 33.5), 78.0),
-        "thigh": Row(14.78, 38.0, (35.0, 34.5, 15.6), 390.0),
-        "shank": Row(4.81, 43.52, (26.7, 26.3, 9.2), 438.6),
-        "foot": Row(1.29, 40.14, (29.9, 27.9, 13.9), 228.3),
-    },
+    sex: {row["segment"]: _row(row) for row in rows_of("de_leva.csv") if row["sex"] == sex}
+    for sex in STATURE_M
 }
 # Of a person of the table's stature [m].
 _ANKLE_HEIGHT = 0.073
@@ -80,17 +71,7 @@ _SPINE, _BELOW, _WAIST_M = 0.33, 0.13, 0.11  # way to the neck, part of the tors
 _NECK_AHEAD = -0.012
 _HEAD_AHEAD = 0.018
 # Standard deviations of people about the table [m], [rad] and of logarithms.
-_COM_SD_M = {
-    "pelvis": 0.011,
-    "torso": 0.012,
-    "head": 0.008,
-    "upper_arm": 0.006,
-    "forearm": 0.005,
-    "hand": 0.003,
-    "thigh": 0.010,
-    "shank": 0.007,
-    "foot": 0.004,
-}
+_COM_SD_M = {row["kind"]: float(row["com_sd_m"]) for row in rows_of("people.csv")}
 _LENGTH_SD, _MASS_SD, _MASS_SIDE_SD, _INERTIA_SD, _INERTIA_SIDE_SD = 0.02, 0.09, 0.03, 0.13, 0.04
 _INERTIA_TURN_RAD = 0.08
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import pandas as pd
 from tqdm import tqdm
 
 from tests.blind.blind_cases import CATALOGUE, Case, Session, long_suite
@@ -28,7 +29,7 @@ from tests.blind.blind_running import (
     write_atomically,
 )
 from tests.blind.blind_scoring import Score, score, score_of_clean_trial
-from tests.blind.blind_tables import lead, scores_frame, tables, write_csv
+from tests.blind.blind_tables import lead, tables, write_csv
 
 BATCH = 8  # people of one study; an interruption loses at most their work
 
@@ -105,7 +106,7 @@ def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> No
     }
     for case in dict.fromkeys(one.case for one in done.scores):
         scores = [one for one in done.scores if one.case == case]
-        record = {"scores": [one.as_record() for one in scores], **common}
+        record = {"scores": list(map(asdict, scores)), **common}
         write_atomically(path_of(results, scores[0]), json.dumps(record, indent=1))
 
 
@@ -114,7 +115,7 @@ def write_tables(results: Path, settings: dict, target: Path) -> None:
     records = [json.loads(path.read_text()) for path in sorted(results.glob("cases/*.json"))]
     if not records:
         raise SystemExit(f"no results in {results}")
-    scores = scores_frame([score for record in records for score in record["scores"]])
+    scores = pd.DataFrame([score for record in records for score in record["scores"]])
     spent = sum(record["cpu_s_recording"] + record["cpu_s_stages"] for record in records)
     asked = ", ".join(f"{name} {value}" for name, value in settings.items())
     print(f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all. {lead(scores)}")

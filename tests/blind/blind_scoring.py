@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -128,9 +128,6 @@ class Score:
     estimates: list[Estimate] = field(default_factory=list)
     gain_percent: float | None = None
     held_out_gain_percent: float | None = None
-
-    def as_record(self) -> dict:
-        return asdict(self)
 
 
 def score(out: Path, recorded: Recorded) -> list[Score]:

@@ -13,7 +13,7 @@ from tests.blind.second_world.balance import GRAVITY, Balanced, balanced
 from tests.blind.second_world.body import SEGMENTS, Body, draw_body
 from tests.blind.second_world.c3d_file import TYPES, write_c3d
 from tests.blind.second_world.effects import Changes, Hidden, changes_of, wobble
-from tests.blind.second_world.lab import Lab, Recorded
+from tests.blind.second_world.lab import Equipment, Lab, Recorded
 from tests.blind.second_world.landmarks import place_landmarks
 from tests.blind.second_world.movements import moving
 from tests.blind.second_world.people import CASES, Case, drawn_cases
@@ -36,7 +36,7 @@ def found(body: Body) -> Balanced:
 
 
 def lab_of(plate_type: int = 2) -> Lab:
-    return Lab("hansen2017", 100, 1000, plate_type, True, np.random.default_rng(SEED))
+    return Lab(Equipment("hansen2017", 100, plate_type, True), np.random.default_rng(SEED))
 
 
 def recorded(body: Body, found: Balanced, lab: Lab, changes: Changes) -> Recorded:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tests.blind.second_world.effects import Hidden
+from tests.blind.second_world.lab import Equipment
 
 
 @dataclass(frozen=True)
@@ -20,16 +21,6 @@ class Somebody:
     sex: str
     mass_kg: float
     height_m: float
-
-
-@dataclass(frozen=True)
-class Equipment:
-    """plate_type : 2, 3 or 4, as C3D numbers them; two_plates : one for each foot."""
-
-    marker_set: str
-    rate_hz: int
-    plate_type: int
-    two_plates: bool
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 from bsip_cli.cli import main
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import TABLE, Effect, by, uniform
-from bsip_cli.simulate.effects.instruments import ChannelFault, OfEveryPlate, number_below
+from bsip_cli.simulate.effects.instruments import OfEveryPlate, OfOneChannel, number_below
 from bsip_cli.simulate.numerics import from_rotation_vector
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Load, Plan
@@ -117,11 +117,12 @@ class Band(Load):
         return self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
 
 
-class LateChannel(ChannelFault, name="outside_late_channel"):
+class LateChannel(OfOneChannel, name="outside_late_channel"):
     """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return np.interp(times_s - self.size, times_s, values)
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        now = reading[:, self.column]
+        reading[:, self.column] = np.interp(times_s - self.size, times_s, now)
 
 
 class LooseConnector(OfEveryPlate, name="outside_loose_connector"):

@@ -59,9 +59,9 @@ def total_in_file(path: Path, lab: Lab) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_body_weighs_what_it_should(body):
-    assert sum(body.masses_kg.values()) == pytest.approx(62.0)
+    assert sum(part.mass for part in body.parts.values()) == pytest.approx(62.0)
     for segment in SEGMENTS:
-        moments = np.linalg.eigvalsh(body.inertias_kgm2[segment])
+        moments = np.linalg.eigvalsh(body.parts[segment].inertia)
         assert moments[0] > 0.0 and moments[0] + moments[1] > 0.95 * moments[2]
 
 

@@ -97,7 +97,7 @@ def test_a_constant_force_takes_itself_off_the_plate():
 def test_an_object_weighs_from_picking_up_to_putting_down():
     trial = trial_with("static", ("object_handled", 2.0, "hand_l"))
     effect = effect_of("object_handled", 2.0, "hand_l")
-    start, end = (round(1000 * t) for t in effect.window_s(DURATION_S["static"]))
+    start, end = (round(1000 * share * DURATION_S["static"]) for share in effect.window_share)
     weight, force = weight_n(), trial.force_n[:, 1]
     assert force[start + 60 : end - 60].mean() == pytest.approx(weight + 2.0 * G, abs=0.5)
     for part in (slice(20, start - 60), slice(end + 60, -20)):

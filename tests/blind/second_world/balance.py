@@ -83,15 +83,15 @@ def ground_wrench(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force [N] and moment about the lab's origin [N m], (N, 3) each."""
     momentum, angular, first_moment = (np.zeros((len(times_s), 3)) for _ in range(3))
-    for segment, mass in body.masses_kg.items():
+    for segment, part in body.parts.items():
         R = poses.rotations[segment]
-        com = poses.points_m(segment, body.coms_m[segment])
+        com = poses.points_m(segment, part.com_m)
         velocity = rate_of(com, times_s)
-        inertia = R @ body.inertias_kgm2[segment] @ R.transpose(0, 2, 1)
+        inertia = R @ part.inertia @ R.transpose(0, 2, 1)
         spin = turned(inertia, _angular_velocity(R, times_s))
-        momentum += mass * velocity
-        angular += mass * np.cross(com, velocity) + spin
-        first_moment += mass * com
+        momentum += part.mass * velocity
+        angular += part.mass * np.cross(com, velocity) + spin
+        first_moment += part.mass * com
     force = rate_of(momentum, times_s) + body.mass_kg * GRAVITY
     moment = rate_of(angular, times_s) + np.cross(first_moment, GRAVITY)
     for load in loads:

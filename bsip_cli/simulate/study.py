@@ -72,8 +72,6 @@ def check_options(options: StudyOptions) -> None:
         raise UsageError(
             f"no trials of the tasks {absent} to hide effects in", expected=", ".join(options.tasks)
         )
-    if options.participants < 1:
-        raise UsageError("no participants", expected="at least one")
     for rates in map(options.rates_of, options.tasks):
         whole = SIMULATION_HZ % rates.marker_hz == 0 and SIMULATION_HZ % rates.analog_hz == 0
         if not whole or rates.analog_hz % rates.marker_hz:

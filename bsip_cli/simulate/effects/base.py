@@ -202,6 +202,10 @@ class OnSegment(Effect):
         """(3,) in the segment's frame."""
         return person.segment_inertias()[self.segment].com_m
 
+    def where(self, person: Person) -> tuple[str, np.ndarray]:
+        """The simulated body, and the place (3,) in its frame."""
+        return body_of(self.segment), self.position_m(person)
+
     def facts(self, person: Person) -> dict[str, Any]:
         return {"position_m": self.position_m(person).tolist()}
 

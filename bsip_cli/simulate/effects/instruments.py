@@ -175,32 +175,29 @@ class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
         reading[:, to] += self.size * reading[:, source]
 
 
-class ChannelFault(OfEveryPlate):
-    """An error of one channel."""
+class OfOneChannel(OfEveryPlate):
+    """One channel shows something else than the truth."""
 
     channel: str = named("fz")
 
-    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
-        column = COMPONENTS.index(self.channel)
-        reading[:, column] = self.shown(reading[:, column], times_s)
-
-    @abstractmethod
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        """What the channel (N,) shows instead of its true values."""
+    @property
+    def column(self) -> int:
+        """Of a reading."""
+        return COMPONENTS.index(self.channel)
 
 
-class PlateGain(ChannelFault, name="plate_gain"):
+class PlateGain(OfOneChannel, name="plate_gain"):
     """The channel shows 1 + size times the truth."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return (1.0 + self.size) * values
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, self.column] *= 1.0 + self.size
 
 
-class PlateZero(ChannelFault, name="plate_zero"):
+class PlateZero(OfOneChannel, name="plate_zero"):
     """A constant is added to the channel, whatever it measures."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return values + self.size
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, self.column] += self.size
 
     def injected(self, instruments: Instruments) -> Instruments:
         """What the software that wrote the file has set to zero stays so."""
@@ -212,8 +209,8 @@ class PlateZero(ChannelFault, name="plate_zero"):
 class PlateDrift(PlateZero, name="plate_drift"):
     """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return values + self.size * times_s
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, self.column] += self.size * times_s
 
 
 # --- markers --------------------------------------------------------------------------------------

@@ -105,8 +105,7 @@ class ReleasedObject(OnSegment, name="released_object"):
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         hold, release = self._hold(plan.recorded_times_s(), plan.recorded_length_s())
-        place = self.position_m(person)
-        return plan.with_load(Ball(body_of(self.segment), place, self.size, hold, release))
+        return plan.with_load(Ball(*self.where(person), self.size, hold, release))
 
     def injected(self, instruments: Instruments) -> Instruments:
         length = len(instruments.points_m) / instruments.marker_hz
@@ -123,17 +122,12 @@ class ObjectHandled(OnSegment, name="object_handled"):
     segment: str = named(*HANDS)
     window_share: tuple[float, float] = span(0.2, 0.35, 0.25, 0.4)
 
-    def window_s(self, length_s: float) -> tuple[float, float]:
-        """Start and end in a trial of this length."""
-        start, end = (share * length_s for share in self.window_share)
-        return start, end
-
     def plan(self, person: Person, plan: Plan) -> Plan:
-        start, end = self.window_s(plan.recorded_length_s())
+        start, end = (share * plan.recorded_length_s() for share in self.window_share)
         half = 0.5 * OPENING_S
         hold = window(plan.recorded_times_s(), start - half, end + half, OPENING_S)
-        place = self.position_m(person) + IN_FRONT_M
-        return plan.with_load(Ball(body_of(self.segment), place, self.size, hold, end))
+        body, place = self.where(person)
+        return plan.with_load(Ball(body, place + IN_FRONT_M, self.size, hold, end))
 
 
 class Implement(OnSegment, name="implement"):
@@ -197,9 +191,8 @@ class WobblingMass(OnSegment, name="wobbling_mass"):
         return replace(person, inertias={**person.inertias, body: rest})
 
     def plan(self, person: Person, plan: Plan) -> Plan:
-        body, place = body_of(self.segment), self.position_m(person)
-        swinging = Swinging(body, place, self.size, self.frequency_hz, self.damping_ratio)
-        return plan.with_load(swinging)
+        tissue = self.size, self.frequency_hz, self.damping_ratio
+        return plan.with_load(Swinging(*self.where(person), *tissue))
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +277,7 @@ class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
             strength *= 1.0 - window(times, a, b, CLEAR_OF_FLIGHT_S)
         aside = ASIDE * np.array([np.cos(self.heading_rad), 0.0, np.sin(self.heading_rad)])
         force = self.size * strength[:, None] * (np.array([0.0, 1.0, 0.0]) + aside)
-        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
+        return plan.with_load(Support(*self.where(person), force))
 
 
 class ExternalForce(OnSegment, name="external_force"):
@@ -301,7 +294,7 @@ class ExternalForce(OnSegment, name="external_force"):
         if plan.flights:
             return plan
         force = np.tile(self.size * self.direction, (len(plan), 1))
-        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
+        return plan.with_load(Support(*self.where(person), force))
 
     def facts(self, person: Person) -> dict[str, Any]:
         return {"upwards_n": float(self.size * self.direction[1])}

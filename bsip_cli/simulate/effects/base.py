@@ -29,10 +29,8 @@ READ: dict[str, Callable[[str], Any]] = {
     **dict.fromkeys(("least", "most"), float),
     **dict.fromkeys(("settings", "needs"), str.split),
     **dict.fromkeys(("spares_static", "injectable"), "yes".__eq__),
-    "targets": lambda text: text.format(segments=", ".join(SEGMENTS), joints=", ".join(JOINTS)),
-    "choices": lambda text: text.format(
-        segments=" ".join(SEGMENTS), joints=" ".join(JOINTS)
-    ).split(),
+    "targets": lambda text: _with_names(text, ", "),
+    "choices": lambda text: _with_names(text, " ").split(),
 }
 """How the columns of the table are read that are no text."""
 

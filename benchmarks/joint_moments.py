@@ -22,7 +22,7 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.simulate.movements import MOVEMENTS
+from bsip_cli.simulate.moving import MOVEMENTS
 from bsip_cli.simulate.options import PRESETS, StudyOptions
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import GRAVITY

@@ -58,13 +58,13 @@ def rewrite_trc_mot(
         or not np.array_equal(getattr(before, name), getattr(after, name), equal_nan=True)
         for name in ("points_m", "readings")
     )
-    _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
+    write_whole(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
     content: str | bytes = mot.read_bytes()
     if loaded:
         content = _new_mot(forces, sets, before, after, said)
     elif said:  # other markers alone are told there as well: a TRC file has no place for it
         content = "\n".join([*forces.head[:-2], *said, *_lines(mot)[len(forces.head) - 2 :]]) + "\n"
-    _write(copy.with_name(copy.stem + mot.name[len(trc.stem) :]), content)
+    write_whole(copy.with_name(copy.stem + mot.name[len(trc.stem) :]), content)
     return after
 
 
@@ -266,7 +266,8 @@ def _new_mot(
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _write(file: Path, content: str | bytes) -> None:
+def write_whole(file: Path, content: str | bytes) -> None:
+    """Under a temporary name first: no half file under the final one."""
     partial = file.with_name(file.name + ".part")
     partial.write_bytes(content.encode() if isinstance(content, str) else content)
     partial.replace(file)

@@ -1,4 +1,4 @@
-"""Find the pelvis' path that makes a planned movement physically possible.
+"""Find the pelvis' path that makes a planned movement physically possible, and the ground wrench.
 
 On the ground the centre of pressure must follow the plan; in flight the centre of mass
 must fall freely and the angular momentum about it must stay constant. All of it is one
@@ -10,10 +10,15 @@ fixed-point iteration on the pelvis' pose:
 - vertically, the pelvis keeps its nominal height, or the centre of mass a prescribed one;
 - in flight, the pelvis turns so that the angular momentum is kept; the turning fades out
   in the stances beside it.
+
+The wrench by the rate of momentum of all bodies (Newton and Euler for the whole):
+F = dp/dt - m g and M = dL/dt - sum r x m g about the walkway's origin, with momenta by numerical
+differentiation of positions and rotations. No equations of motion of a tree.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,25 +28,30 @@ from scipy.linalg import solve_banded
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.simulate.kinematics import (
-    Momentum,
-    Turns,
-    locked_inertia,
-    momentum_of,
-    poses_of,
-    turns_of,
-)
 from bsip_cli.simulate.numerics import (
     HALF_WIDTH,
     bridge,
     derivative,
     from_rotation_vector,
     integral,
+    rotate,
     runs,
     second_derivative,
+    transpose,
+    unskew,
 )
-from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import G, Plan, Poses, total_load
+from bsip_cli.simulate.people import Inertia, Person
+from bsip_cli.simulate.plan import (
+    GRAVITY,
+    G,
+    Load,
+    Plan,
+    Poses,
+    Turns,
+    poses_of,
+    total_load,
+    turns_of,
+)
 
 UP = np.array([0.0, 1.0, 0.0])
 SWAY_LIMIT_M = np.array([0.045, 0.020])  # ahead, aside
@@ -339,3 +349,60 @@ def _turn_rate(
         kept = np.linalg.solve(gain, -lacking.sum(axis=0))
         result[group] = lacking + haste * w * np.einsum("tij,j->ti", mobility, kept)
     return result
+
+
+# --- momentum and the ground's wrench -------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Momentum:
+    """Whole-body momentum in an inertial frame.
+
+    com_m : (T, 3). linear : (T, 3) [kg m/s]. angular : (T, 3) about the origin [kg m2/s].
+    """
+
+    mass_kg: float
+    com_m: np.ndarray
+    linear: np.ndarray
+    angular: np.ndarray
+
+    def spin(self) -> np.ndarray:
+        """(T, 3) angular momentum about the centre of mass."""
+        return self.angular - np.cross(self.com_m, self.linear)
+
+
+def momentum_of(inertias: dict[str, Inertia], poses: Poses, step_s: float) -> Momentum:
+    """Sum over bodies of their momenta."""
+    samples = len(next(iter(poses.origin_m.values())))
+    first, linear, angular = np.zeros((3, samples, 3))
+    for body, part in inertias.items():
+        R, r = poses.rotation[body], poses.point(body, part.com_m)
+        p = part.mass_kg * derivative(r, step_s)
+        turning = unskew(transpose(R) @ derivative(R, step_s))  # body axes
+        first += part.mass_kg * r
+        linear += p
+        angular += np.cross(r, p) + rotate(R, turning @ part.tensor_kgm2)
+    mass = sum(part.mass_kg for part in inertias.values())
+    return Momentum(mass, first / mass, linear, angular)
+
+
+def locked_inertia(inertias: dict[str, Inertia], poses: Poses, com_m: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) inertia of the body as if it were stiff, about its centre of mass."""
+    total = np.zeros((len(com_m), 3, 3))
+    for body, part in inertias.items():
+        R, r = poses.rotation[body], poses.point(body, part.com_m) - com_m
+        parallel = np.sum(r * r, axis=-1)[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None, :]
+        total += R @ part.tensor_kgm2 @ transpose(R) + part.mass_kg * parallel
+    return total
+
+
+def ground_wrench(
+    inertias: dict[str, Inertia], poses: Poses, step_s: float, loads: Iterable[Load] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force (T, 3) [N] on the body and moment (T, 3) [N m] about the walkway's origin."""
+    momentum = momentum_of(inertias, poses, step_s)
+    weight = momentum.mass_kg * GRAVITY
+    load_force, load_moment = total_load(loads, poses, step_s)
+    force = derivative(momentum.linear, step_s) - weight + load_force
+    gravity_moment = np.cross(momentum.com_m, weight)
+    return force, derivative(momentum.angular, step_s) - gravity_moment + load_moment

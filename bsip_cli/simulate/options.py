@@ -16,7 +16,7 @@ class Richness:
     """How much the simulated world differs from the model that is fitted to it.
 
     soft_tissue : scale of the markers' motion against the bone (0 = rigid).
-    measured_tissue : whether it is that of measured people (`landmarks`): larger on trunk and
+    measured_tissue : whether it is that of measured people (`people`): larger on trunk and
         thighs, curved in the pose, and swinging with part of the segments' mass.
     marker_noise_m : white noise, standard deviation per axis.
     marker_drift_m : slow correlated noise, standard deviation per axis.

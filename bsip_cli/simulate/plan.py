@@ -1,4 +1,5 @@
-"""What a movement prescribes (joint angles, feet, support, what the body carries), and its sketch.
+"""What a movement prescribes (joint angles, feet, support, what the body carries), its sketch, and
+the poses of all bodies that follow from it.
 
 Walkway frame: X ahead, Y up, Z right, origin on the ground; moments are about it. A plan leaves the
 pelvis' horizontal path (and in flight its whole pose) to `balance`.
@@ -6,7 +7,6 @@ pelvis' horizontal path (and in flight its whole pose) to `balance`.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
@@ -14,13 +14,17 @@ from typing import Any
 import numpy as np
 
 from bsip_cli.simulate.numerics import (
+    about_axis,
+    about_x,
     about_y,
     about_z,
     euler_zxy,
+    frame_of,
     rotate,
     second_derivative,
     slow_drift,
     step,
+    transpose,
 )
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 
@@ -53,34 +57,42 @@ class Poses:
 
 
 @dataclass(frozen=True, eq=False)
-class Load(ABC):
-    """Something that the body has to move, to hold, or may lean on."""
+class Load:
+    """Something at a point of a body that it has to move, to hold, or may lean on.
 
-    @abstractmethod
+    position_m : (3,) in the body's frame.
+    """
+
+    body: str
+    position_m: np.ndarray
+
+    def force(self, path_m: np.ndarray, step_s: float) -> np.ndarray:
+        """(T, 3) force that the body exerts on it, while the point takes a path (T, 3)."""
+        raise NotImplementedError
+
     def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Force (T, 3) that the body exerts on it, and that force's moment (T, 3)."""
+        r = poses.point(self.body, self.position_m)
+        force = self.force(r, step_s)
+        return force, np.cross(r, force)
 
 
 @dataclass(frozen=True, eq=False)
 class Ball(Load):
     """A ball, or any small object, in a hand; a point mass.
 
-    position_m : (3,) in the body's frame.
     hold : (T,) 1 while held, falling smoothly to 0 at the release.
     release_s : when half the load has left the hand, on the recording's clock.
     """
 
-    body: str
     mass_kg: float
-    position_m: np.ndarray
     hold: np.ndarray
     release_s: float
 
-    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """The force that moves and holds it."""
-        r = poses.point(self.body, self.position_m)
-        force = self.hold[:, None] * self.mass_kg * (second_derivative(r, step_s) - GRAVITY)
-        return force, np.cross(r, force)
+    def force(self, path_m: np.ndarray, step_s: float) -> np.ndarray:
+        """What moves and holds it."""
+        acceleration = second_derivative(path_m, step_s)
+        return self.hold[:, None] * self.mass_kg * (acceleration - GRAVITY)
 
 
 def total_load(loads: Iterable[Load], poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -188,6 +200,120 @@ class Plan:
         return replace(thin(self), step_s=self.step_s * factor, keep=keep)
 
 
+# --- the poses that follow from a plan, wherever the pelvis is ------------------------------------
+
+
+DOWN = np.array([0.0, -1.0, 0.0])
+# Of a clavicle at an arm raised by 120 degrees (Ludewig 2009, J Bone Joint Surg Am 91): raised,
+# drawn back, turned backwards about its own axis.
+RHYTHM_RAD = np.deg2rad([10.0, 16.0, 30.0])
+RAISED = 1.0 - np.cos(np.deg2rad(120.0))
+Turns = dict[str, np.ndarray]
+"""Rotations (T, 3, 3) of bodies against the body they hang on; of the pelvis in the walkway frame,
+nominal in flight. None of the thorax where the trunk is stiff."""
+
+
+def clavicle_turn(arm_in_thorax: np.ndarray, own_rad: np.ndarray, sign: float) -> np.ndarray:
+    """(T, 3, 3) rotation of a clavicle against the thorax, none where the arm hangs.
+
+    arm_in_thorax : (T, 3, 3). own_rad : (T, 2) raised and brought forward on top of the arm's
+    rhythm.
+    sign : 1 of the right side, -1 of the left one.
+    """
+    part = (1.0 - arm_in_thorax[:, 1, 1]) / RAISED
+    raised, back, turned = (part * angle for angle in RHYTHM_RAD)
+    raised, forward = raised + own_rad[:, 0], own_rad[:, 1] - back
+    return about_y(sign * forward) @ about_x(-sign * raised) @ about_z(turned)
+
+
+def turns_of(person: Person, plan: Plan) -> Turns:
+    """What the plan prescribes above the hips, wherever the pelvis is."""
+    angles = plan.angles_rad
+    turns = {
+        "lower_torso": euler_zxy(plan.pelvis_angles_rad),
+        "abdomen": euler_zxy(angles["waist"]),
+        "head": euler_zxy(angles["neck"]),
+    }
+    if "spine" in angles:
+        turns["thorax"] = euler_zxy(angles["spine"])
+    for side, sign in SIDE_SIGN.items():
+        flexion, deviation, pronation = angles[f"wrist_{side}"].T
+        arm = euler_zxy(np.array([1.0, -sign, sign]) * angles[f"shoulder_{side}"])
+        turns[f"upper_arm_{side}"] = arm
+        if f"sternoclavicular_{side}" in person.joints_m:
+            own = angles.get(f"girdle_{side}", np.zeros((len(plan), 2)))
+            turns[f"clavicle_{side}"] = clavicle_turn(arm, own, sign)
+        elbow = angles[f"elbow_{side}"]
+        turns[f"forearm_{side}"] = about_axis(person.hinges[f"elbow_{side}"], elbow)
+        wrist = about_y(sign * pronation) @ about_z(flexion) @ about_x(-sign * deviation)
+        turns[f"hand_{side}"] = wrist
+    return turns
+
+
+def poses_of(
+    person: Person, plan: Plan, turns: Turns, pelvis_m: np.ndarray, pelvis_rotation: np.ndarray
+) -> Poses:
+    """All bodies' poses for the pelvis' path (T, 3) and rotation (T, 3, 3), and ``turns_of`` the
+    plan."""
+    joints = person.joints_m
+    poses = Poses({"lower_torso": pelvis_rotation}, {"lower_torso": pelvis_m}, np.zeros(len(plan)))
+    rotation, origin = poses.rotation, poses.origin_m
+
+    def hang(body: str, parent: str, place_m: np.ndarray) -> None:
+        origin[body] = poses.point(parent, place_m)
+        rotation[body] = rotation[parent] @ turns[body]
+
+    hang("abdomen", "lower_torso", np.zeros(3))
+    thorax = rotation["abdomen"] @ turns["thorax"] if "thorax" in turns else rotation["abdomen"]
+    origin["thorax"] = poses.point("abdomen", joints["tjc"]) + rotate(thorax, joints["cjc"])
+    rotation["thorax"] = thorax
+    origin["head"], rotation["head"] = origin["thorax"], thorax @ turns["head"]
+    for side in SIDES:
+        upper, lower, clavicle = (f"{b}_{side}" for b in ("upper_arm", "forearm", "clavicle"))
+        shoulder = joints[f"shoulder_{side}"]
+        hang(upper, "thorax", shoulder)
+        if clavicle in turns:
+            joint = joints[f"sternoclavicular_{side}"]
+            hang(clavicle, "thorax", joint)
+            origin[upper] = poses.point(clavicle, shoulder - joint)
+        hang(lower, upper, joints[f"elbow_{side}"])
+        hang(f"hand_{side}", lower, joints[f"wrist_{side}"])
+        excess = _leg(person, plan, side, poses)
+        np.maximum(poses.excess_reach_m, excess, out=poses.excess_reach_m)
+    return poses
+
+
+def _leg(person: Person, plan: Plan, side: str, poses: Poses) -> np.ndarray:
+    """Thigh and shank between the hip and the planned ankle; returns the excess reach.
+
+    The knee angle follows from the distance (law of cosines, exact for a tilted hinge);
+    the free turn about the line from hip to ankle brings the hinge between the lateral
+    axes of the pelvis and of the foot.
+    """
+    planned, hinge = plan.feet[side], person.hinges[f"knee_{side}"]
+    thigh, shank, foot = (f"{name}_{side}" for name in ("thigh", "shank", "foot"))
+    hip = poses.point("lower_torso", person.joints_m[f"hip_{side}"])
+    line = planned.position_m - hip
+    distance = np.linalg.norm(line, axis=1)
+    upper, lower = person.lengths_m[thigh], person.lengths_m[shank]
+    longest = plan.longest_reach * (upper + lower)
+    reach = np.minimum(distance, longest)
+
+    along = float(hinge @ DOWN)
+    cosine = (reach**2 - upper**2 - lower**2) / (2.0 * upper * lower)
+    cosine = (cosine - along**2) / (1.0 - along**2)
+    bend = about_axis(hinge, -np.arccos(np.clip(cosine, -1.0, 1.0)))
+    ankle_in_thigh = upper * DOWN + lower * rotate(bend, DOWN)
+    lateral = poses.rotation["lower_torso"][:, :, 2] + planned.rotation[:, :, 2]
+    in_thigh = frame_of(ankle_in_thigh, np.broadcast_to(hinge, ankle_in_thigh.shape))
+    poses.origin_m[thigh] = hip
+    poses.rotation[thigh] = frame_of(line, lateral) @ transpose(in_thigh)
+    poses.origin_m[shank] = poses.point(thigh, upper * DOWN)
+    poses.rotation[shank] = poses.rotation[thigh] @ bend
+    poses.origin_m[foot], poses.rotation[foot] = planned.position_m, planned.rotation
+    return np.maximum(distance - longest, 0.0)
+
+
 # --- a movement under construction: arrays that the movements add to, then a plan -----------------
 
 
@@ -258,6 +384,18 @@ class Sketch:
     def mid_foot_m(self) -> float:
         """Middle of the base of support ahead of the ankle."""
         return 0.25 * self.person.lengths_m["foot_r"]
+
+    def bend(self, name: str, angle_rad: np.ndarray | float) -> None:
+        """Add to an angle by its name and column, as "waist 0", "elbow_r" or "pelvis 2"."""
+        joint, _, column = name.strip().partition(" ")
+        angle = self.pelvis_angles if joint == "pelvis" else self.angles[joint]
+        angle = angle[:, int(column)] if column else angle
+        angle += angle_rad
+
+    def bend_both(self, name: str, angle_rad: np.ndarray | float) -> None:
+        """Add to an angle of either side, as "shoulder_* 1"."""
+        for side in SIDES:
+            self.bend(name.replace("*", side), angle_rad)
 
     def shift_load(self, side: str, part: np.ndarray) -> None:
         """Move a part (T,) of the body's weight from one foot to the other one."""
@@ -351,4 +489,5 @@ def held_ball(
     """A ball in front of the palm, let go over about 10 ms around release_s."""
     hold = 1.0 - step(sketch.t_s, release_s - 0.006, release_s + 0.006)
     place = np.array([0.035, -0.95 * sketch.person.lengths_m[f"hand_{side}"], 0.0])
-    return Ball(f"hand_{side}", mass_kg, place + 0.004 * rng.standard_normal(3), hold, release_s)
+    place = place + 0.004 * rng.standard_normal(3)
+    return Ball(f"hand_{side}", place, mass_kg, hold, release_s)

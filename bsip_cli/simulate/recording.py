@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import ezc3d
 import numpy as np
@@ -12,14 +13,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.segments import without_side
-from bsip_cli.simulate.balance import balanced
+from bsip_cli.simulate.balance import balanced, ground_wrench
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.kinematics import ground_wrench
-from bsip_cli.simulate.landmarks import Marker, Swing, tissue_of
-from bsip_cli.simulate.movements import MOVEMENTS
+from bsip_cli.simulate.moving import MOVEMENTS
 from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
-from bsip_cli.simulate.people import SIDES, Person
+from bsip_cli.simulate.people import SIDES, Marker, Person, Swing, tissue_of
 from bsip_cli.simulate.plan import STEP_S, Plan, Poses
 
 THIN = 4  # trials without flight are balanced at 250 Hz and interpolated
@@ -385,35 +384,34 @@ def write_trial(
 
     quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
     """
-    parameters = ("RATE", "LABELS", "DESCRIPTIONS", "UNITS")
     c3d, plates, labels = ezc3d.c3d(), measurement.plates, [*measurement.labels]
-    names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
-    said, units = [f"Force plate {name[-1]}" for name in names], ["N"] * 3 + ["Nmm"] * 3
-    for group, *values in (
-        ("POINT", [float(measurement.marker_hz)], labels, labels, ["mm"]),
-        ("ANALOG", [float(measurement.analog_hz)], names, said, units * len(plates)),
-    ):
-        for name, value in zip(parameters, values, strict=True):
+    count, rates = len(plates), (float(measurement.marker_hz), float(measurement.analog_hz))
+    names = [f"{name}{k + 1}" for k in range(count) for name in CHANNELS]
+    parameters: dict[str, dict[str, Any]] = {
+        "POINT": {"RATE": [rates[0]], "LABELS": labels, "DESCRIPTIONS": labels, "UNITS": ["mm"]},
+        "ANALOG": {
+            "RATE": [rates[1]],
+            "LABELS": names,
+            "DESCRIPTIONS": [f"Force plate {name[-1]}" for name in names],
+            "UNITS": (["N"] * 3 + ["Nmm"] * 3) * count,
+        },
+        "FORCE_PLATFORM": {  # arrays of integers: of lists ezc3d makes floats
+            "UNITS": ["N"],
+            "USED": np.array([count]),
+            "TYPE": np.full(count, 2),
+            "ZERO": np.array([1, 0]),
+            "CHANNEL": np.arange(1, 6 * count + 1).reshape(count, 6).T,
+            "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
+            "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
+        },
+        "SUBJECTS": {"NAMES": [subject], "USES_PREFIXES": np.array([0])},
+        "MANUFACTURER": {"COMPANY": ["simulation"], "SOFTWARE": ["bsip simulate"]},
+    }
+    for group, values in parameters.items():
+        for name, value in values.items():
+            if name not in c3d["parameters"].get(group, {}):
+                c3d.add_parameter(group, name, value if isinstance(value, list) else [0.0])
             c3d["parameters"][group][name]["value"] = value
-    count = len(plates)  # integers of the group are set by hand because ezc3d writes floats
-    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
-    force_platform = c3d["parameters"]["FORCE_PLATFORM"]
-    for name, value in {
-        "USED": np.array([count]),
-        "TYPE": np.full(count, 2),
-        "ZERO": np.array([1, 0]),
-        "CHANNEL": np.arange(1, 6 * count + 1).reshape(count, 6).T,
-        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
-        "ORIGIN": np.stack([MM * plate.origin_m for plate in plates], axis=-1),
-    }.items():
-        if name not in force_platform:
-            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
-        force_platform[name]["value"] = value
-    c3d.add_parameter("SUBJECTS", "NAMES", [subject])
-    c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])
-    c3d["parameters"]["SUBJECTS"]["USES_PREFIXES"]["value"] = np.array([0])
-    c3d.add_parameter("MANUFACTURER", "COMPANY", ["simulation"])
-    c3d.add_parameter("MANUFACTURER", "SOFTWARE", ["bsip simulate"])
     frames, markers, _ = measurement.points_m.shape
     lost = np.isnan(measurement.points_m).any(axis=2).T
     homogeneous = np.ones((4, markers, frames))

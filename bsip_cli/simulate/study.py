@@ -18,11 +18,11 @@ from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files.regular import ENDINGS, check_regular, entries, fault_of, is_folder, lies_in
 from bsip_cli.instruments.c3d_file import rewrite_c3d
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
-from bsip_cli.simulate.effects import effects_of, pair_up, touches
-from bsip_cli.simulate.effects.base import Effect, body_of
+from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot, write_whole
+from bsip_cli.simulate.effects import Effect, effects_of, pair_up, touches
+from bsip_cli.simulate.effects.base import body_of
 from bsip_cli.simulate.effects.loads import WobblingMass
-from bsip_cli.simulate.movements import MOVEMENTS
+from bsip_cli.simulate.moving import MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, PRESETS, StudyOptions
 from bsip_cli.simulate.people import Inertia, Person, draw_person
 from bsip_cli.simulate.recording import (
@@ -54,10 +54,10 @@ def simulate_study(folder: Path, options: StudyOptions) -> list[Person]:
         scale = generator(options, number, LABORATORY, "static")
         mass = person.mass_kg + SCALE_SPREAD_KG * scale.standard_normal()
         lines.append(f"sub-{number:02d}\t{person.sex}\t{mass:.1f}\t{person.stature_m:.2f}")
-    write_text(folder / "participants.tsv", "\n".join(lines) + "\n")
+    write_whole(folder / "participants.tsv", "\n".join(lines) + "\n")
     with_girdle = 'marker_set = "robert17"\nskeleton = "robert17"\n'
     settings = with_girdle if options.richness.girdle else 'marker_set = "hansen2017"\n'
-    write_text(folder / "study.toml", settings)
+    write_whole(folder / "study.toml", settings)
     return people
 
 
@@ -71,8 +71,6 @@ def check_options(options: StudyOptions) -> None:
         raise UsageError(
             f"no trials of the tasks {absent} to hide effects in", expected=", ".join(options.tasks)
         )
-    if options.participants < 1:
-        raise UsageError("no participants", expected="at least one")
     for rates in map(options.rates_of, options.tasks):
         whole = SIMULATION_HZ % rates.marker_hz == 0 and SIMULATION_HZ % rates.analog_hz == 0
         if not whole or rates.analog_hz % rates.marker_hz:
@@ -151,7 +149,7 @@ def wobbling(person: Person) -> list[WobblingMass]:
 def _person_record(person: Person) -> dict[str, object]:
     """The person in SI units, segment axes."""
     parts = {name: person.inertias[name] for name in ("abdomen", "thorax")}
-    segments = person.segment_inertias()
+    segments, markers = person.segment_inertias(), person.markers.items()
     return {
         "sex": person.sex,
         "mass_kg": person.mass_kg,
@@ -160,25 +158,23 @@ def _person_record(person: Person) -> dict[str, object]:
         "ankle_height_m": person.ankle_height_m,
         "swinging_tissue": {name: asdict(swing) for name, swing in person.tissue.items()},
         "segment_lengths_m": person.lengths_m,
-        "joints_in_parent_m": {name: p.tolist() for name, p in person.joints_m.items()},
-        "hinge_axes": {name: axis.tolist() for name, axis in person.hinges.items()},
+        "joints_in_parent_m": person.joints_m,
+        "hinge_axes": person.hinges,
         "segments": {name: _inertia_record(part) for name, part in segments.items()},
         "trunk_parts": {name: _inertia_record(part) for name, part in parts.items()},
-        "markers": {
-            label: {"body": marker.body, "position_m": marker.position_m.tolist()}
-            for label, marker in person.markers.items()
-        },
+        "markers": {k: {"body": one.body, "position_m": one.position_m} for k, one in markers},
     }
 
 
 def _inertia_record(part: Inertia) -> dict[str, float]:
     """Names and conventions of the inertial-parameter artifact (about the centre of mass)."""
-    tensor = part.tensor_kgm2
-    record = {"mass_kg": part.mass_kg}
-    record |= {f"com_{a}_m": part.com_m[i] for i, a in enumerate("xyz")}
-    record |= {f"i{a}{a}_kgm2": tensor[i, i] for i, a in enumerate("xyz")}
-    record |= {"ixy_kgm2": tensor[0, 1], "ixz_kgm2": tensor[0, 2], "iyz_kgm2": tensor[1, 2]}
-    return {name: float(value) for name, value in record.items()}
+    axes = {axis: number for number, axis in enumerate("xyz")}
+    pairs = ("xx", "yy", "zz", "xy", "xz", "yz")
+    return {
+        "mass_kg": part.mass_kg,
+        **{f"com_{axis}_m": x for axis, x in zip("xyz", part.com_m, strict=True)},
+        **{f"i{ab}_kgm2": part.tensor_kgm2[axes[ab[0]], axes[ab[1]]] for ab in pairs},
+    }
 
 
 def _trial_record(
@@ -188,39 +184,25 @@ def _trial_record(
 
     Times are on the movement's clock, on which the file starts at `recorded_from_s`.
     """
-    pose, plan, ball = measurement.pose, trial.plan, trial.plan.ball
-    times = plan.recorded_times_s()
+    plan, ball = trial.plan, trial.plan.ball
+    times, length = plan.recorded_times_s(), len(trial.time_s) * plan.step_s
     spans = [(times[first], times[last]) for first, last in plan.flights]
-    length = len(trial.time_s) * plan.step_s
     on_plate_n = [trial.on_plate[s] * force[:, 1] for s, force in trial.feet_force_n.items()]
-    held = ball and {
-        "segment": ball.body,
-        "mass_kg": ball.mass_kg,
-        "position_m": ball.position_m.tolist(),
-        "release_s": ball.release_s,
-    }
+    of_the_ball = ("mass_kg", "position_m", "release_s")
     of_a_contact = ("side", "start_s", "end_s", "on_plate")
-    inside = (span for span in spans if span[1] > 0.0 and span[0] < length)
     return {
         "seed": seed,
         "duration_s": len(measurement.points_m) / measurement.marker_hz,
         "recorded_from_s": measurement.start_s,
         "effects": [effect.name for effect in effects],
-        "ball": held,
+        "ball": ball and {"segment": ball.body, **{k: getattr(ball, k) for k in of_the_ball}},
         "contacts": [{name: getattr(one, name) for name in of_a_contact} for one in trial.contacts],
-        "flights_s": [[round(float(time), 3) for time in span] for span in inside],
-        "all_contacts_measured_share": float(np.mean(trial.all_contacts_measured())),
-        "largest_vertical_force_n": float(sum(on_plate_n).max()),
-        "walkway_to_lab": {"rotation": pose.rotation.tolist(), "offset_m": pose.offset_m.tolist()},
+        "flights_s": [np.round(span, 3) for span in spans if span[1] > 0.0 and span[0] < length],
+        "all_contacts_measured_share": np.mean(trial.all_contacts_measured()),
+        "largest_vertical_force_n": sum(on_plate_n).max(),
+        "walkway_to_lab": vars(measurement.pose),
         **plan.notes,
     }
-
-
-def write_text(path: Path, text: str) -> None:
-    """Under a temporary name first: no half file under the final one."""
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
 
 
 # --- the commands, and effects in measured recordings ---------------------------------------------
@@ -439,4 +421,4 @@ def _files_in(folder: Path, refused: list[BadDataError], above: tuple[Path, ...]
 
 def write_truth(file: Path, record: Mapping[str, object]) -> None:
     """What is hidden in a recording, or in all of a participant."""
-    write_text(file, json.dumps(record, indent=1, default=np.generic.item) + "\n")
+    write_whole(file, json.dumps(record, indent=1, default=lambda array: array.tolist()) + "\n")

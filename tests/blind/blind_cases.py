@@ -1,12 +1,15 @@
 """What is hidden where: cases drawn from a seed, and the sessions that hold them.
 
-Only names, sizes and places of the simulator stand here. Sizes are in the effects' units.
+Only names, sizes and places of the simulator stand here and in `blind_cases.csv`. Sizes are in the
+effects' units; those of a changed rate end where ingest sees it.
 """
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -71,59 +74,15 @@ class Range:
     signed: bool = False
 
 
-HANDS = ("hand_l", "hand_r")
-BODY = (*HANDS, "forearm_l", "forearm_r", "upper_torso", "lower_torso", "thigh_l", "thigh_r")
-HEAVY = ("lower_torso", "upper_torso", "head", "thigh_l", "thigh_r", "shank_l", "shank_r")
-JOINTS = ("hip_l", "hip_r", "knee_l", "knee_r", "shoulder_l", "shoulder_r", "ankle_l", "elbow_r")
-MARKERS = ("RASIS", "LPSIS", "C7", "T10", "LAC", "RELB", "LKNEL", "RKNEM", "LMALL", "RMT2")
-PAIRS = ("RWRR+RWRU", "LWRR+LWRU", "RKNEL+RKNEM", "LMALL+LMALM", "RMALL+RMALM")
+def _range(row: dict[str, str]) -> Range:
+    targets, places = (tuple(row[name].split()) for name in ("targets", "places"))
+    return Range(float(row["least"]), float(row["most"]), targets, places, row["signed"] == "yes")
 
-CATALOGUE: dict[str, Range] = {
-    "sync_offset": Range(0.005, 0.02, ("-",), (SESSION, "squat", SESSION, "hops"), True),
-    "clock_drift": Range(2e-4, 5e-4, ("-",), (SESSION,), True),
-    "frame_rate": Range(0.05, 0.12, ("-",), (SESSION,), True),  # more, ingest sees
-    "plate_translation": Range(0.01, 0.03, ("-",), (SESSION, "squat")),
-    "plate_rotation": Range(0.0175, 0.07, ("yaw",), (SESSION, "squat"), True),
-    "plate_gain": Range(0.02, 0.05, ("fz",), (SESSION, "stepon", SESSION, "hops"), True),
-    "plate_crosstalk": Range(0.01, 0.03, ("fz:fx", "fz:fy"), (SESSION, "squat"), True),
-    "plate_zero": Range(8.0, 25.0, ("fz", "fx", "fy"), (SESSION, "squat"), True),
-    "plate_drift": Range(1.0, 2.0, ("fz", "fx", "fy"), ("squat",), True),
-    "gravity_tilt": Range(0.009, 0.035, ("-",), (SESSION, "squat")),
-    "added_mass": Range(0.5, 1.5, BODY, ("squat", "hops", "stepon")),
-    "released_object": Range(0.3, 0.7, HANDS, ("squat",)),
-    "wobbling_mass": Range(3.0, 4.5, ("thigh_l", "thigh_r", "upper_torso"), ("hops", SESSION)),
-    "breathing": Range(0.05, 0.3, ("-",), (SESSION,)),
-    "unmeasured_contact": Range(20.0, 40.0, HANDS, ("squat", "stepon")),
-    "joint_centre": Range(0.015, 0.04, JOINTS, (SESSION,)),
-    "missing_joint": Range(0.2, 0.6, ("spine",), (SESSION, "squat")),
-    "marker_shift": Range(0.02, 0.04, MARKERS, ("squat", "stepon")),
-    "marker_swap": Range(0.5, 2.0, PAIRS, ("squat", "stepon")),
-    "over_smoothing": Range(2.0, 5.0, ("-",), (SESSION, "hops", SESSION, "squat")),
-    "segment_inertia": Range(0.3, 0.6, HEAVY, (SESSION,), True),
-    "implement": Range(0.2, 0.8, HANDS, (SESSION,)),
-    "camera_frame": Range(0.009, 0.035, ("-",), (SESSION,)),
-    "external_force": Range(20.0, 80.0, BODY, ("squat", SESSION)),
-    "object_handled": Range(0.3, 2.0, HANDS, ("squat",)),
-    "marker_slide": Range(0.02, 0.04, MARKERS, ("squat",)),
-}
-OUTSIDE: dict[str, Range] = {
-    "outside_belt_vibration": Range(15.0, 40.0, ("-",), (SESSION, "squat")),
-    "outside_plate_hysteresis": Range(5.0, 15.0, ("-",), (SESSION, "squat")),
-    "outside_plate_saturation": Range(0.03, 0.1, ("-",), (SESSION, "hops")),
-    "outside_repeated_frames": Range(0.1, 0.3, ("-",), (SESSION, "squat")),
-    "outside_elastic_tether": Range(50.0, 200.0, ("-",), (SESSION, "squat")),
-    "outside_late_channel": Range(0.01, 0.04, ("fx", "fy", "fz"), (SESSION, "squat")),
-    "outside_loose_connector": Range(0.01, 0.04, ("-",), (SESSION, "squat")),
-    "outside_clock_jump": Range(0.02, 0.1, ("-",), (SESSION, "squat"), True),
-    "outside_plate_creep": Range(0.03, 0.1, ("-",), (SESSION, "squat")),
-    "outside_plate_ringing": Range(0.2, 0.6, ("-",), (SESSION, "hops")),
-    "outside_slow_forces": Range(2.0, 4.0, ("-",), (SESSION, "hops")),
-    "outside_uneven_plate": Range(0.2, 0.8, ("-",), (SESSION, "squat"), True),
-    "outside_held_samples": Range(0.1, 0.3, ("-",), (SESSION, "squat")),
-    "outside_coarse_steps": Range(20.0, 60.0, ("-",), (SESSION, "squat")),
-    "outside_water": Range(40.0, 150.0, ("-",), (SESSION, "squat")),
-    "outside_camera_bump": Range(0.009, 0.035, ("-",), (SESSION, "squat"), True),
-}
+
+_ROWS = csv.DictReader(Path(__file__).with_suffix(".csv").read_text("utf-8").splitlines())
+_RANGES = {row["effect"]: _range(row) for row in _ROWS}
+CATALOGUE = {name: one for name, one in _RANGES.items() if not name.startswith("outside_")}
+OUTSIDE = {name: one for name, one in _RANGES.items() if name not in CATALOGUE}
 # Two of these at once can be told apart in any trial that holds both.
 DOUBLES: tuple[tuple[str, str], ...] = (
     ("sync_offset", "plate_translation"),

@@ -10,16 +10,26 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import pandas as pd
 from tqdm import tqdm
 
-from tests.blind.blind_batch import Batch, run_batch
 from tests.blind.blind_cases import CATALOGUE, Case, Session, long_suite
-from tests.blind.blind_running import ROOT, STAGES, TABLES, write_atomically
-from tests.blind.blind_scoring import Score
-from tests.blind.blind_tables import lead, scores_frame, tables, write_csv
+from tests.blind.blind_running import (
+    ROOT,
+    STAGES,
+    TABLES,
+    Recorded,
+    cpu_seconds,
+    record_study,
+    run_pipeline,
+    write_atomically,
+)
+from tests.blind.blind_scoring import Score, score, score_of_clean_trial
+from tests.blind.blind_tables import lead, tables, write_csv
 
 BATCH = 8  # people of one study; an interruption loses at most their work
 
@@ -96,7 +106,7 @@ def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> No
     }
     for case in dict.fromkeys(one.case for one in done.scores):
         scores = [one for one in done.scores if one.case == case]
-        record = {"scores": [one.as_record() for one in scores], **common}
+        record = {"scores": list(map(asdict, scores)), **common}
         write_atomically(path_of(results, scores[0]), json.dumps(record, indent=1))
 
 
@@ -105,12 +115,71 @@ def write_tables(results: Path, settings: dict, target: Path) -> None:
     records = [json.loads(path.read_text()) for path in sorted(results.glob("cases/*.json"))]
     if not records:
         raise SystemExit(f"no results in {results}")
-    scores = scores_frame([score for record in records for score in record["scores"]])
+    scores = pd.DataFrame([score for record in records for score in record["scores"]])
     spent = sum(record["cpu_s_recording"] + record["cpu_s_stages"] for record in records)
     asked = ", ".join(f"{name} {value}" for name, value in settings.items())
     print(f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all. {lead(scores)}")
     for name, table in tables(scores).items():
         write_csv(target, name, table)
+
+
+# --- sessions to scores: record them, run the command line, compare -------------------------------
+
+
+Pipeline = Callable[[Path, Sequence[str], int], list[str]]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What became of some sessions. cpu_s : of their recordings, and of the stages."""
+
+    scores: tuple[Score, ...]
+    problems: tuple[str, ...]
+    cpu_s: tuple[float, float]
+
+
+def run_batch(
+    sessions: Sequence[Session],
+    folder: Path,
+    stages: Sequence[str],
+    jobs: int,
+    pipeline: Pipeline = run_pipeline,
+) -> Batch:
+    """Answers to all cases of some sessions; ``folder`` keeps recordings, truth and artifacts."""
+    start = cpu_seconds()
+    recorded = recordings_of(sessions, folder, jobs)
+    shutil.rmtree(folder / "out", ignore_errors=True)  # of another version of bsip
+    between = cpu_seconds()
+    problems = pipeline(folder, stages, jobs)
+    end = cpu_seconds()
+    scores = [one for case in recorded for one in score(folder / "out", case)]
+    scores += clean_trials(sessions, recorded, folder / "out")
+    return Batch(tuple(scores), tuple(problems), (between - start, end - between))
+
+
+def recordings_of(sessions: Sequence[Session], folder: Path, jobs: int) -> list[Recorded]:
+    """Those that an interrupted run has made, or made now."""
+    path = folder / "truth.json"
+    if path.exists():
+        return [Recorded.from_record(one) for one in json.loads(path.read_text())]
+    shutil.rmtree(folder, ignore_errors=True)
+    recorded = record_study(sessions, folder, jobs)
+    write_atomically(path, json.dumps([asdict(one) for one in recorded]))
+    return recorded
+
+
+def clean_trials(
+    sessions: Sequence[Session], recorded: Sequence[Recorded], out: Path
+) -> list[Score]:
+    """The clean squat of everybody in whose other trials something is hidden."""
+    people = {case.session: case.participant for case in recorded}
+    return [
+        score_of_clean_trial(
+            out, people[host.name], host.name, f"{people[host.name]}_task-squat_run-1"
+        )
+        for host in sessions
+        if host.whole is None
+    ]
 
 
 if __name__ == "__main__":

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
 
-from tests.blind.blind_cases import NOTHING, SESSION
+from tests.blind.blind_cases import NOTHING, SESSION, Case
 from tests.blind.blind_running import Recorded
 from tests.blind.blind_truth import Expected, Record, equivalents, expected
 
@@ -129,17 +129,13 @@ class Score:
     gain_percent: float | None = None
     held_out_gain_percent: float | None = None
 
-    def as_record(self) -> dict:
-        return asdict(self)
-
 
 def score(out: Path, recorded: Recorded) -> list[Score]:
     """One score per hidden effect of a case; one for a null."""
     answers = answers_of(out, recorded)
     records = recorded.truth["effects"]
     if not records:
-        case = recorded.case
-        return [_quiet(case.name, case.kind, case.place, recorded.session, answers)]
+        return [_quiet(recorded.case, recorded.session, answers)]
     return [
         _score_of(out, recorded, record, answers, given.size)
         for record, given in zip(records, recorded.case.hidden, strict=True)
@@ -150,22 +146,22 @@ def score_of_clean_trial(out: Path, participant: str, session: str, stem: str) -
     """A trial without anything hidden, of a person in whose other trials something is."""
     path = out / participant / f"{stem}_diagnosis.parquet"
     answers = [read_answer(path, stem)] if path.is_file() else []
-    return _quiet(f"{session}-clean", "clean trial", "squat", session, answers)
+    return _quiet(Case(f"{session}-clean", "clean trial", "squat"), session, answers)
 
 
-def _quiet(case: str, kind: str, place: str, session: str, answers: list[Answer]) -> Score:
+def _quiet(case: Case, session: str, answers: list[Answer]) -> Score:
     """Recordings with nothing hidden: all that is named is a false positive."""
     verdict, says = _verdict(NOTHING, set(), "", answers)
     wrong = [f"{alarm} ({_where(a)})" for a in answers for alarm in a.alarms()]
     if answers and not wrong:
         verdict = RIGHT_NAME
-    return Score(case, kind, place, session, verdict, says, wrong=wrong)
+    return Score(case.name, case.kind, case.place, session, verdict, says, wrong=wrong)
 
 
 def _score_of(
     out: Path, recorded: Recorded, record: Record, answers: list[Answer], size: float
 ) -> Score:
-    trials = recorded.truth["trials"]
+    case, trials = recorded.case, recorded.truth["trials"]
     sought = {a.source: expected(record, _trial_of(trials, a, record["effect"])) for a in answers}
     aim = expected(record, _longest(trials.values()))
     present = {other["effect"] for other in recorded.truth["effects"]}
@@ -178,23 +174,22 @@ def _score_of(
     found = [a for a in answers if a.about(aim.effect)]
     right = [a for a in found if any(aim.same_target(t) for t in a.about(aim.effect))]
     best = next(iter(right), None)
+    of_the_best = (
+        {}
+        if best is None
+        else {
+            "estimates": _estimates(out, recorded, best, sought[best.source]),
+            "gain_percent": _mean(best.told(aim.effect)["gain_percent"]),
+            "held_out_gain_percent": _held_out_gain(out, recorded, best),
+        }
+    )
     return Score(
-        case=recorded.case.name,
-        kind=recorded.case.kind,
-        place=recorded.case.place,
-        session=recorded.session,
-        effect=record["effect"],
-        size=size,
-        unit=record["unit"],
-        target=aim.target,
-        verdict=verdict,
-        says=says,
+        *(case.name, case.kind, case.place, recorded.session, verdict, says),
+        *(record["effect"], size, record["unit"], aim.target),
         target_right=bool(right) if found and aim.effect != UNEXPLAINED else None,
         targets=sorted(set().union(*(a.about(aim.effect) for a in found))),
         wrong=wrong,
-        estimates=_estimates(out, recorded, best, sought[best.source]) if best else [],
-        gain_percent=_gain(best, aim.effect),
-        held_out_gain_percent=_held_out_gain(out, recorded, best),
+        **of_the_best,
     )
 
 
@@ -300,16 +295,8 @@ def _bounds(folder: Path, answer: Answer, sought: Expected) -> dict[str, float]:
     return {}
 
 
-def _gain(answer: Answer | None, effect: str) -> float | None:
-    if answer is None:
-        return None
-    return _mean(answer.told(effect)["gain_percent"])
-
-
-def _held_out_gain(out: Path, recorded: Recorded, answer: Answer | None) -> float | None:
+def _held_out_gain(out: Path, recorded: Recorded, answer: Answer) -> float | None:
     """Mean over components of the gain artifact beside the answer, where `extend` wrote one."""
-    if answer is None:
-        return None
     stem = recorded.participant if answer.source == PERSON else answer.source
     path = out / recorded.participant / f"{stem}_gain.parquet"
     return _mean(pd.read_parquet(path)["gain_percent"]) if path.is_file() else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -26,11 +25,6 @@ from tests.blind.blind_scoring import (
 
 HIDDEN_KINDS = ("single", "double", "outside")
 ESTIMATED = [field.name for field in fields(Estimate)]
-
-
-def scores_frame(records: Sequence[dict]) -> pd.DataFrame:
-    """One row per hidden effect or null, as `Score.as_record` has them."""
-    return pd.DataFrame(list(records))
 
 
 def estimates_frame(scores: pd.DataFrame) -> pd.DataFrame:
@@ -72,36 +66,28 @@ def confusion(scores: pd.DataFrame) -> pd.DataFrame:
 
 def detection(scores: pd.DataFrame, parts: int = 3) -> pd.DataFrame:
     """Found (name or class) of all, in as many parts of the sizes with equal counts."""
-    single = scores[scores["kind"] == "single"]
     rows = []
-    for effect, group in single.groupby("effect"):
+    for effect, group in scores[scores["kind"] == "single"].groupby("effect"):
         ordered = group.assign(size=group["size"].abs()).sort_values("size")
         for part in np.array_split(np.arange(len(ordered)), parts):
-            chosen = ordered.iloc[part]
-            if len(chosen):
-                found = chosen["verdict"].isin(FOUND)
+            if len(part):
+                chosen = ordered.iloc[part]
                 least, most = chosen["size"].min(), chosen["size"].max()
-                sizes = f"{least:.3g} to {most:.3g} {chosen['unit'].iloc[0]}"
-                count = f"{found.sum()} of {len(chosen)}"
-                noticed = (~chosen["verdict"].isin([MISSED, SILENT])).sum()
-                rows.append(
-                    {
-                        "effect": effect,
-                        "size": sizes,
-                        "found": count,
-                        "noticed": f"{noticed} of {len(chosen)}",
-                    }
-                )
+                row = {
+                    "effect": effect,
+                    "size": f"{least:.3g} to {most:.3g} {chosen['unit'].iloc[0]}",
+                }
+                row["found"] = _part_true(chosen["verdict"].isin(FOUND))
+                row["noticed"] = _part_true(~chosen["verdict"].isin([MISSED, SILENT]))
+                rows.append(row)
     return pd.DataFrame(rows)
 
 
 def by_place(scores: pd.DataFrame) -> pd.DataFrame:
     """Found of all, where the effect is in the whole session or in one trial of a kind."""
     single = scores[scores["kind"] == "single"]
-    found = single.assign(found=single["verdict"].isin(FOUND))
-    counts = found.groupby(["effect", "place"])["found"].agg(["sum", "size"])
-    counts["text"] = counts["sum"].astype(str) + " of " + counts["size"].astype(str)
-    return counts["text"].unstack().fillna("")
+    groups = single["verdict"].isin(FOUND).groupby([single["effect"], single["place"]])
+    return groups.apply(_part_true).unstack().fillna("")
 
 
 def false_positives(scores: pd.DataFrame) -> pd.DataFrame:
@@ -143,15 +129,10 @@ def pairs(scores: pd.DataFrame) -> pd.DataFrame:
     effects = cases["effect"].apply(" and ".join)
     table = pd.DataFrame({"hidden": effects, "found": found, "wrong": wrong})
     groups = table.groupby("hidden")
-    return pd.DataFrame(
-        {
-            "cases": groups.size(),
-            "both": groups["found"].apply(lambda n: int((n == 2).sum())),
-            "one": groups["found"].apply(lambda n: int((n == 1).sum())),
-            "none": groups["found"].apply(lambda n: int((n == 0).sum())),
-            "a wrong name": groups["wrong"].sum(),
-        }
-    )
+    counts = pd.crosstab(table["hidden"], table["found"]).reindex(columns=[2, 1, 0], fill_value=0)
+    counts.columns = ["both", "one", "none"]
+    counts.insert(0, "cases", groups.size())
+    return counts.assign(**{"a wrong name": groups["wrong"].sum()})
 
 
 def accuracy(estimates: pd.DataFrame) -> pd.DataFrame:
@@ -159,8 +140,6 @@ def accuracy(estimates: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (effect, parameter), group in estimates.groupby(["effect", "parameter"], sort=False):
         error = group["estimate"] - group["truth"]
-        stated = group.dropna(subset=["ci_low", "ci_high"])
-        inside = (stated["ci_low"] <= stated["truth"]) & (stated["truth"] <= stated["ci_high"])
         rows.append(
             {
                 "effect": effect,
@@ -172,7 +151,7 @@ def accuracy(estimates: pd.DataFrame) -> pd.DataFrame:
                 "spread": error.std(ddof=1) if len(error) > 1 else np.nan,
                 "median error": error.abs().median(),
                 "errors / bound": _beside_bound(error, group["bound"]),
-                "95 % CI holds it": f"{inside.sum()} of {len(stated)}",
+                "95 % CI holds it": _part_true(_inside(group)) or "0 of 0",
             }
         )
     return pd.DataFrame(rows)
@@ -187,15 +166,20 @@ def _beside_bound(error: pd.Series, bound: pd.Series) -> float:
 
 def coverage(estimates: pd.DataFrame) -> str:
     """One sentence over all parameters with an interval."""
-    stated = estimates.dropna(subset=["ci_low", "ci_high"])
-    inside = (stated["ci_low"] <= stated["truth"]) & (stated["truth"] <= stated["ci_high"])
-    if stated.empty:
+    inside = _inside(estimates)
+    if inside.empty:
         return "No estimate has an interval."
-    low, high = wilson(int(inside.sum()), len(stated))
+    low, high = wilson(int(inside.sum()), len(inside))
     return (
-        f"{inside.sum()} of {len(stated)} stated 95 % intervals hold the truth "
+        f"{_part_true(inside)} stated 95 % intervals hold the truth "
         f"({inside.mean():.1%}; {low:.1%} to {high:.1%})."
     )
+
+
+def _inside(estimates: pd.DataFrame) -> pd.Series:
+    """Whether an interval holds the truth, of those that are stated."""
+    stated = estimates.dropna(subset=["ci_low", "ci_high"])
+    return stated["truth"].between(stated["ci_low"], stated["ci_high"])
 
 
 def gains(scores: pd.DataFrame) -> pd.DataFrame:
@@ -213,22 +197,6 @@ def wilson(count: int, total: int) -> tuple[float, float]:
     """95 % interval of a share (Wilson's score interval)."""
     low, high = binomtest(count, total).proportion_ci(method="wilson")
     return float(low), float(high)
-
-
-def markdown(table: pd.DataFrame) -> str:
-    """A table with its index as the first column where that has a name."""
-    flat = table.reset_index() if table.index.name else table
-    head = [str(name) for name in flat.columns]
-    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
-    for row in flat.itertuples(index=False):
-        lines.append("| " + " | ".join(_cell(value) for value in row) + " |")
-    return "\n".join(lines)
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float):
-        return "" if np.isnan(value) else f"{value:.3g}"
-    return str(value)
 
 
 def _part_true(values: pd.Series) -> str:
@@ -277,7 +245,7 @@ def tables(scores: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 def document(scores: pd.DataFrame) -> str:
     """All tables for a terminal."""
-    written = [f"{name}\n\n{markdown(table)}" for name, table in tables(scores).items()]
+    written = [f"{name}\n\n{table.to_string()}" for name, table in tables(scores).items()]
     return "\n\n".join([lead(scores), *written]) + "\n"
 
 

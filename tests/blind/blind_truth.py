@@ -47,9 +47,13 @@ def expected(record: Record, trial: Record) -> Expected:
     return Expected(effect, target, values)
 
 
-def _sized(name: str) -> Mapping:
-    """An effect without place whose size is the parameter."""
-    return lambda record, trial: ("", {name: record["size"]})
+def _xyz(name: str, vector: Iterable[float]) -> dict[str, float]:
+    return {f"{name}_{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
+
+
+def _plate(record: Record) -> str:
+    """The plate that errs; 0 stands for all of them."""
+    return str(record["plate"] or PLATE)
 
 
 def _channel(name: str, signed: bool) -> Mapping:
@@ -60,59 +64,27 @@ def _channel(name: str, signed: bool) -> Mapping:
     return mapped
 
 
+def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Mapping:
+    return lambda record, trial: (place(record), dict(zip(names, record[field], strict=True)))
+
+
+def _of_segment(**columns: str) -> Mapping:
+    """Parameters that the truth has under other names, at its segment."""
+    return lambda record, trial: (
+        record.get("segment", "upper_torso"),
+        {name: record[column] for name, column in columns.items()},
+    )
+
+
 def _crosstalk(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     source, sink = record["source"], record["to"]
     sign = Z_UP[source] * Z_UP[sink]
     return f"{_plate(record)} {source}>{sink}", {"coefficient": sign * record["size"]}
 
 
-def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Mapping:
-    return lambda record, trial: (place(record), dict(zip(names, record[field], strict=True)))
-
-
-def _gravity(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+def _turned(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     x, y, _ = record["turn_rad"]
     return "", {"angle": float(np.hypot(x, y)), "angle_x": x, "angle_y": y}
-
-
-def _added(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    return record["segment"], {"mass": record["size"], **_xyz("position", record["position_m"])}
-
-
-def _released(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    begin = trial["recorded_from_s"]
-    release = record["release_s"]
-    if release is None:
-        release = record["release_share"] * (trial["duration_s"] + begin)
-    return record["segment"], {"mass": record["size"], "release_time": release - begin}
-
-
-def _wobbling(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    values = {"mass": record["size"], "frequency": record["frequency_hz"]}
-    return record["segment"], {**values, "damping_ratio": record["damping_ratio"]}
-
-
-def _breathing(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    return "upper_torso", {"amplitude": record["size"], "frequency": record["frequency_hz"]}
-
-
-def _contact(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    """The horizontal part is drawn in the walkway's axes (X ahead, Y up, Z right)."""
-    heading = record["heading_rad"]
-    walkway = np.array([ASIDE * np.cos(heading), 1.0, ASIDE * np.sin(heading)])
-    force = record["size"] * np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
-    size = float(np.linalg.norm(force))
-    return record["segment"], {**_window(record, trial), "force": size, **_xyz("force", force)}
-
-
-def _pushed(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    walkway = record["size"] * np.array(record["direction"])
-    force = np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
-    return record["segment"], {"force": record["size"], **_xyz("force", force)}
-
-
-def _handled(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    return record["segment"], {"mass": record["size"], **_window(record, trial)}
 
 
 def _window(record: Record, trial: Record) -> dict[str, float]:
@@ -122,18 +94,30 @@ def _window(record: Record, trial: Record) -> dict[str, float]:
     return {"start": start, "end": end}
 
 
-def _xyz(name: str, vector: Iterable[float]) -> dict[str, float]:
-    return {f"{name}_{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
+def _released(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    begin, release = trial["recorded_from_s"], record["release_s"]
+    if release is None:
+        release = record["release_share"] * (trial["duration_s"] + begin)
+    return record["segment"], {"mass": record["size"], "release_time": release - begin}
+
+
+def _in_lab(walkway: np.ndarray, trial: Record) -> dict[str, float]:
+    """A force in the walkway's axes (X ahead, Y up, Z right), in which it is drawn."""
+    force = np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
+    return {"force": float(np.linalg.norm(force)), **_xyz("force", force)}
+
+
+def _contact(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    heading = record["heading_rad"]
+    walkway = np.array([ASIDE * np.cos(heading), 1.0, ASIDE * np.sin(heading)])
+    force = _in_lab(record["size"] * walkway, trial)
+    return record["segment"], {**_window(record, trial), **force}
 
 
 def _implement(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     distance = float(np.linalg.norm(record["centre_m"]))
     inertia = record["size"] * (distance**2 + record["spread_m"] ** 2)
     return record["segment"], {"mass": record["size"], "centre": distance, "inertia": inertia}
-
-
-def _missing_joint(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    return "upper_torso", {"flexion": trial["missing_joint_range_rad"]}
 
 
 def _shifted_marker(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
@@ -145,7 +129,7 @@ def _shifted_marker(record: Record, trial: Record) -> tuple[str, dict[str, float
 
 
 def _sliding(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
-    """Its direction is drawn in the frame of neighbouring markers: only its length is known."""
+    """As of a shifted one."""
     start, end = (share * trial["duration_s"] for share in record["window_share"])
     return record["marker"], {"way": record["size"], "start": start, "end": end}
 
@@ -158,38 +142,44 @@ def _swapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     return pair, {"start": start, "end": start + record["size"]}
 
 
-def _plate(record: Record) -> str:
-    """The plate that errs; 0 stands for all of them."""
-    return str(record["plate"] or PLATE)
-
-
 MAPPINGS: dict[str, Mapping] = {
-    "sync_offset": _sized("delay"),
-    "clock_drift": _sized("rate_error"),
-    "frame_rate": lambda record, trial: ("", {"rate_ratio": 1 + record["size"]}),
+    "sync_offset": lambda r, trial: ("", {"delay": r["size"]}),
+    "clock_drift": lambda r, trial: ("", {"rate_error": r["size"]}),
+    "frame_rate": lambda r, trial: ("", {"rate_ratio": 1 + r["size"]}),
     "plate_translation": _vector(("x", "y", "z"), "shift_m", _plate),
     "plate_rotation": _vector(("tilt_x", "tilt_y", "yaw"), "turn_rad", _plate),
     "plate_gain": _channel("gain", signed=False),
     "plate_crosstalk": _crosstalk,
     "plate_zero": _channel("offset", signed=True),
     "plate_drift": _channel("drift", signed=True),
-    "gravity_tilt": _gravity,
-    "added_mass": _added,
+    "gravity_tilt": _turned,
+    "added_mass": lambda r, trial: (
+        r["segment"],
+        {"mass": r["size"], **_xyz("position", r["position_m"])},
+    ),
     "released_object": _released,
-    "wobbling_mass": _wobbling,
-    "breathing": _breathing,
+    "wobbling_mass": _of_segment(
+        mass="size", frequency="frequency_hz", damping_ratio="damping_ratio"
+    ),
+    "breathing": _of_segment(amplitude="size", frequency="frequency_hz"),
     "unmeasured_contact": _contact,
     "joint_centre": _vector(("shift_x", "shift_y", "shift_z"), "shift_m", lambda r: r["joint"]),
-    "missing_joint": _missing_joint,
+    "missing_joint": lambda r, trial: (
+        "upper_torso",
+        {"flexion": trial["missing_joint_range_rad"]},
+    ),
     "marker_shift": _shifted_marker,
     "marker_swap": _swapped,
-    "over_smoothing": _sized("cutoff"),
+    "over_smoothing": lambda r, trial: ("", {"cutoff": r["size"]}),
     # What share of the error a segment's table values make is not known to the simulator.
-    "segment_inertia": lambda record, trial: (record["segment"], {}),
+    "segment_inertia": _of_segment(),
     "implement": _implement,
-    "camera_frame": _gravity,
-    "external_force": _pushed,
-    "object_handled": _handled,
+    "camera_frame": _turned,
+    "external_force": lambda r, trial: (
+        r["segment"],
+        _in_lab(r["size"] * np.array(r["direction"]), trial),
+    ),
+    "object_handled": lambda r, trial: (r["segment"], {"mass": r["size"], **_window(r, trial)}),
     "marker_slide": _sliding,
 }
 

@@ -9,19 +9,17 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from bsip_cli.cli import main
 from bsip_cli.instruments.readings import Instruments, SensingPlate
-from bsip_cli.simulate.effects import EFFECTS
-from bsip_cli.simulate.effects.base import KINDS, TABLE, Effect, Target
-from bsip_cli.simulate.effects.instruments import ChannelFault, OfEveryPlate
+from bsip_cli.simulate.effects.base import TABLE, Effect, by, uniform
+from bsip_cli.simulate.effects.instruments import OfEveryPlate, OfOneChannel, number_below
 from bsip_cli.simulate.numerics import from_rotation_vector
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import Load, Plan, Poses
+from bsip_cli.simulate.plan import Load, Plan
 
 OUTSIDE = {
     row["name"]: row
@@ -42,13 +40,8 @@ RINGS_HZ, RINGS_DAMPED = (7.0, 12.0), 0.05
 class BeltVibration(OfEveryPlate, name="outside_belt_vibration"):
     """Plates shake vertically by `size` N at about 5 Hz while somebody stands on them."""
 
-    frequency_hz: float
-    phase_rad: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        frequency = BELT_HZ * float(rng.uniform(0.8, 1.2))
-        return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
+    frequency_hz: float = by(lambda size, target, rng: BELT_HZ * float(rng.uniform(0.8, 1.2)))
+    phase_rad: float = uniform(-np.pi, np.pi)
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         wave = np.sin(2.0 * np.pi * self.frequency_hz * times_s + self.phase_rad)
@@ -88,11 +81,7 @@ class PlateSaturation(OfEveryPlate, name="outside_plate_saturation"):
 class RepeatedFrames(Effect, name="outside_repeated_frames"):
     """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
 
-    seed: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, int(rng.integers(1 << 31)))
+    seed: int = number_below(1 << 31)
 
     def measured(self, instruments: Instruments) -> Instruments:
         frames = len(instruments.points_m)
@@ -111,31 +100,29 @@ class ElasticTether(Effect, name="outside_elastic_tether"):
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         fastened = plan.pelvis_m[plan.keep.start] + np.array(FASTENED_M)
-        return plan.with_load(Band(self.size, fastened))
+        return plan.with_load(Band("lower_torso", np.zeros(3), self.size, fastened))
 
 
 @dataclass(frozen=True, eq=False)
 class Band(Load):
-    """An elastic band from a fixed point (3,) to the pelvis, taut from the start."""
+    """An elastic band from a fixed point (3,), taut from the start."""
 
     stiffness_n_m: float
     fastened_m: np.ndarray
 
-    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the body exerts on the band."""
-        r = poses.origin_m["lower_torso"]
-        away = r - self.fastened_m
+    def force(self, path_m: np.ndarray, step_s: float) -> np.ndarray:
+        away = path_m - self.fastened_m
         length = np.linalg.norm(away, axis=1, keepdims=True)
         rest = float(np.linalg.norm(FASTENED_M)) - SLACK_M
-        force = self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
-        return force, np.cross(r, force)
+        return self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
 
 
-class LateChannel(ChannelFault, name="outside_late_channel"):
+class LateChannel(OfOneChannel, name="outside_late_channel"):
     """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return np.interp(times_s - self.size, times_s, values)
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        now = reading[:, self.column]
+        reading[:, self.column] = np.interp(times_s - self.size, times_s, now)
 
 
 class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
@@ -144,11 +131,7 @@ class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
     `size` is the standard deviation of the gain.
     """
 
-    seed: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, int(rng.integers(1 << 31)))
+    seed: int = number_below(1 << 31)
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         knots = np.arange(times_s[0], times_s[-1] + WANDERS_S, WANDERS_S)
@@ -159,11 +142,7 @@ class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
 class ClockJump(Effect, name="outside_clock_jump"):
     """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
 
-    from_share: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, float(rng.uniform(0.35, 0.65)))
+    from_share: float = uniform(0.35, 0.65)
 
     def measured(self, instruments: Instruments) -> Instruments:
         times = instruments.sample_times_s()
@@ -186,11 +165,7 @@ class PlateCreep(OfEveryPlate, name="outside_plate_creep"):
 class PlateRinging(OfEveryPlate, name="outside_plate_ringing"):
     """The part `size` of every channel goes through a resonance: a plate on a floor that swings."""
 
-    frequency_hz: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, float(rng.uniform(*RINGS_HZ)))
+    frequency_hz: float = uniform(*RINGS_HZ)
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         pace = 2.0 * np.pi * self.frequency_hz
@@ -219,11 +194,7 @@ class UnevenPlate(OfEveryPlate, name="outside_uneven_plate"):
 class HeldSamples(OfEveryPlate, name="outside_held_samples"):
     """The converter stalls: all channels hold their value for moments; `size` is their part."""
 
-    seed: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, int(rng.integers(1 << 31)))
+    seed: int = number_below(1 << 31)
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         count, rate = len(times_s), 1.0 / (times_s[1] - times_s[0])
@@ -248,33 +219,26 @@ class Water(Effect, name="outside_water"):
     """Something brakes the pelvis by `size` N at 1 m/s, with the square of its velocity."""
 
     def plan(self, person: Person, plan: Plan) -> Plan:
-        return plan.with_load(Brake(self.size))
+        return plan.with_load(Brake("lower_torso", np.zeros(3), self.size))
 
 
 @dataclass(frozen=True, eq=False)
 class Brake(Load):
-    """A force on the pelvis against its velocity."""
+    """A force against the velocity."""
 
     drag_n_s2_m2: float
 
-    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the body exerts on what brakes it."""
-        r = poses.origin_m["lower_torso"]
-        velocity = np.gradient(r, step_s, axis=0)
-        force = self.drag_n_s2_m2 * np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
-        return force, np.cross(r, force)
+    def force(self, path_m: np.ndarray, step_s: float) -> np.ndarray:
+        velocity = np.gradient(path_m, step_s, axis=0)
+        return self.drag_n_s2_m2 * np.linalg.norm(velocity, axis=1, keepdims=True) * velocity
 
 
 class CameraBump(Effect, name="outside_camera_bump"):
     """From a moment on all markers are turned by `size` about a level axis through the lab's
     origin: somebody ran into a camera."""
 
-    heading_rad: float
-    from_share: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, float(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.35, 0.65)))
+    heading_rad: float = uniform(-np.pi, np.pi)
+    from_share: float = uniform(0.35, 0.65)
 
     def measured(self, instruments: Instruments) -> Instruments:
         axis = np.array([np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0])
@@ -284,8 +248,6 @@ class CameraBump(Effect, name="outside_camera_bump"):
         points[first:] = points[first:] @ turn.T
         return replace(instruments, points_m=points)
 
-
-EFFECTS.update({name: KINDS[name] for name in OUTSIDE})
 
 if __name__ == "__main__":
     main()

@@ -18,9 +18,8 @@ import pandas as pd
 from tqdm import tqdm
 
 from tests.blind.blind_running import ROOT, STAGES, TABLES, CommandError, run_pipeline
-from tests.blind.blind_tables import markdown, write_csv
-from tests.blind.second_world.drawn_people import drawn_cases
-from tests.blind.second_world.people import CASES, Case
+from tests.blind.blind_tables import write_csv
+from tests.blind.second_world.people import CASES, Case, drawn_cases
 from tests.blind.second_world.study import PERSON, drawn, write_study
 
 NOTHING = "nothing"
@@ -37,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked = [(case, options.results / case.name) for case in cases]
         problems = list(tqdm(pool.map(answer, asked), total=len(asked), unit="case"))
     table = pd.DataFrame(row for case in people for row in rows_of(case, options.results))
-    print(markdown(table))
+    print(table.to_string())
     write_csv(options.tables, options.results.name.replace("-", "_"), table)
     if said := [problem for problem in problems if problem]:
         raise SystemExit("\n".join(said))

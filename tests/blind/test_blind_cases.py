@@ -9,7 +9,6 @@ import pytest
 
 from bsip_cli.effects.catalogue import EFFECTS
 from tests.blind import blind_long
-from tests.blind.blind_batch import Batch
 from tests.blind.blind_cases import (
     CATALOGUE,
     OUTSIDE,
@@ -20,6 +19,7 @@ from tests.blind.blind_cases import (
     long_suite,
     short_suite,
 )
+from tests.blind.blind_long import Batch
 from tests.blind.blind_running import record_study
 from tests.blind.blind_scoring import RIGHT_NAME, Score, score
 

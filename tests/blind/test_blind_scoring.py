@@ -35,7 +35,7 @@ from tests.blind.blind_tables import (
     estimates_frame,
     false_positives,
     pairs,
-    scores_frame,
+    tables,
 )
 
 COLUMNS = (
@@ -110,7 +110,7 @@ def test_a_named_effect_elsewhere_has_the_wrong_target_and_no_estimate(tmp_path)
     found = told(tmp_path, GAIN)
     assert (found.verdict, found.target_right, found.targets) == (RIGHT_NAME, False, ["1 fx"])
     assert not found.estimates and found.gain_percent is None
-    table = elsewhere(scores_frame([found.as_record()]))
+    table = elsewhere(pd.DataFrame([found]))
     assert table.iloc[0].tolist() == ["plate_gain", "1 fz", "1 fx"]
 
 
@@ -201,7 +201,7 @@ def test_errors_are_told_in_units_of_the_bound_of_their_recording(tmp_path):
     diagnosis(tmp_path, SQUAT, row("sync_offset", parameter="delay", estimate=0.0101))
     found = told(tmp_path, DELAY)
     assert found.estimates[0].bound == 0.0005
-    table = accuracy(estimates_frame(scores_frame([found.as_record()])))
+    table = accuracy(estimates_frame(pd.DataFrame([found])))
     assert table["errors / bound"][0] == pytest.approx(0.2 / 0.6745, rel=1e-3)
     diagnosis(tmp_path, "sub-01", row("none"), causes=causes[:1])
     assert told(tmp_path, DELAY).estimates[0].bound is None
@@ -217,7 +217,7 @@ def test_each_of_two_effects_has_its_own_verdict(tmp_path):
     diagnosis(tmp_path, SQUAT, row("sync_offset"))
     found, missed = score(tmp_path, hidden(DELAY, SHIFT))
     assert (found.verdict, missed.verdict, missed.wrong) == (RIGHT_NAME, MISSED, [])
-    table = pairs(scores_frame([found.as_record(), missed.as_record()]))
+    table = pairs(pd.DataFrame([found, missed]))
     assert table.iloc[0].tolist() == [1, 0, 1, 0, 0]
 
 
@@ -250,7 +250,7 @@ def test_a_null_is_quiet_or_has_a_false_positive(tmp_path, rows, verdict, says):
     clean = score_of_clean_trial(tmp_path, "sub-01", "session-001", SQUAT)
     assert (null.verdict, null.says) == (clean.verdict, clean.says) == (verdict, says)
     assert bool(null.wrong) == (verdict != RIGHT_NAME)
-    found = false_positives(scores_frame([null.as_record(), clean.as_record()]))
+    found = false_positives(pd.DataFrame([null, clean]))
     assert found["false positives"].tolist() == [int(verdict != RIGHT_NAME)] * 2
 
 
@@ -260,7 +260,7 @@ def test_a_shift_of_a_marker_is_compared_by_its_length(tmp_path):
     shift = row("marker_shift", target="C7", parameter="shift", estimate=0.028, unit="m")
     moment = row("marker_shift", target="C7", **sized("from_time", "s", 4.1, 3.9, 4.2))
     diagnosis(tmp_path, SQUAT, shift, moment)
-    frame = estimates_frame(scores_frame([told(tmp_path, slipped).as_record()]))
+    frame = estimates_frame(pd.DataFrame([told(tmp_path, slipped)]))
     assert frame["parameter"].tolist() == ["shift", "from_time"]
     np.testing.assert_allclose(frame["estimate"], [0.028, 4.1])
     np.testing.assert_allclose(frame["truth"], [0.03, 4.0])
@@ -303,10 +303,14 @@ def test_all_tables_of_a_mixed_bag(tmp_path):
     scores = [
         replace(one, case=f"case-{k}") for k, c in enumerate(cases) for one in score(tmp_path, c)
     ]
-    text = document(scores_frame([one.as_record() for one in scores]))
+    frame = pd.DataFrame(scores)
+    text, found = document(frame), tables(frame)
     assert "Of 2 effects hidden alone 1 are found (0 of them as a class), 1 get a wrong" in text
     assert "0 of 2 stated 95 % intervals hold the truth (0.0%" in text
-    assert "| sync_offset | 0.01 to 0.01 s | 1 of 1 | 1 of 1 |" in text
-    assert "| sync_offset | delay | s | 2 | 0.01 | 0.002 | 0 | 0.002 |  | 0 of 2 |" in text
-    assert "| one trial |" not in text and "100.0% (20.7% to 100.0%)" in text
-    assert "| outside_elastic_tether | 1 |" in text
+    sizes, (accurate,) = found["blind_sizes"].values.tolist(), found["blind_estimates"].values
+    assert ["sync_offset", "0.01 to 0.01 s", "1 of 1", "1 of 1"] in sizes
+    assert accurate[:4].tolist() == ["sync_offset", "delay", "s", 2]
+    assert accurate[4:8].tolist() == pytest.approx([0.01, 0.002, 0.0, 0.002])
+    assert np.isnan(accurate[8]) and accurate[9] == "0 of 2"
+    assert "one trial" not in text and "100.0% (20.7% to 100.0%)" in text
+    assert found["blind_outside"].loc["outside_elastic_tether"].sum() == 1

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
-from tests.blind.blind_batch import Batch, run_batch
 from tests.blind.blind_cases import CATALOGUE, short_suite
+from tests.blind.blind_long import Batch, run_batch
 from tests.blind.blind_running import STAGES
 from tests.blind.blind_scoring import (
     FOUND,
@@ -16,7 +17,7 @@ from tests.blind.blind_scoring import (
     WRONG_NAME,
     Score,
 )
-from tests.blind.blind_tables import document, scores_frame
+from tests.blind.blind_tables import document
 
 SEED = 7
 pytestmark = pytest.mark.long(minutes=45)  # once, for all of them
@@ -31,7 +32,7 @@ WRONG_TARGETS_ALLOWED = 3
 @pytest.fixture(scope="module")
 def batch(tmp_path_factory) -> Batch:
     done = run_batch(short_suite(SEED), tmp_path_factory.mktemp("blind"), STAGES, jobs=2)
-    print(document(scores_frame([score.as_record() for score in done.scores])))
+    print(document(pd.DataFrame(done.scores)))
     return done
 
 

@@ -15,14 +15,14 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.instruments.readings import Instruments
+from bsip_cli.simulate.effects import Effect as HiddenEffect
 from bsip_cli.simulate.effects import drawn, pair_up
-from bsip_cli.simulate.effects.base import Effect as HiddenEffect
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.recording import plates_of
 from bsip_cli.simulate.study import simulate_study
 from tests.blind import outside_effects  # noqa: F401 (the simulator knows them from here on)
 from tests.blind.blind_cases import CATALOGUE as RANGES
-from tests.blind.blind_cases import OUTSIDE, PAIRS
+from tests.blind.blind_cases import OUTSIDE
 from tests.blind.blind_truth import MAPPINGS, PLATE, Expected, equivalents, expected
 from tests.effects.moving_scene import RATE_HZ, moving, standing_still
 
@@ -108,6 +108,7 @@ def test_a_tilted_lab_tilts_the_weight_as_the_mapped_angles_say():
     assert sought.values["angle"] == pytest.approx(0.02)
 
 
+PAIR = RANGES["marker_swap"].targets[0]
 PERSONAL = {
     "added_mass": (1.0, "hand_l"),
     "released_object": (0.5, "hand_r"),
@@ -117,7 +118,7 @@ PERSONAL = {
     "joint_centre": (0.02, "hip_l"),
     "missing_joint": (0.3, ""),
     "marker_shift": (0.03, "RKNEM"),
-    "marker_swap": (0.5, PAIRS[0]),
+    "marker_swap": (0.5, PAIR),
     "over_smoothing": (3.0, ""),
     "segment_inertia": (0.3, "thigh_r"),
     "implement": (0.4, "hand_r"),
@@ -158,7 +159,7 @@ def test_the_diagnosis_prints_what_the_mapping_expects(name, everything):
     record = next(record for record in records if record["effect"] == name)
     scene, effect, sought = scene_with_markers(), EFFECTS[name], expected(record, trial)
     if name == "marker_swap":  # its candidates come from residuals of exchanged labels
-        assert sought.target == PAIRS[0] and set(sought.values) == {"start", "end"}
+        assert sought.target == PAIR and set(sought.values) == {"start", "end"}
         return
     if name != "wobbling_mass":  # looked for only where somebody lands
         assert sought.target in effect.targets(scene)

@@ -12,12 +12,11 @@ import pytest
 from tests.blind.second_world.balance import GRAVITY, Balanced, balanced
 from tests.blind.second_world.body import SEGMENTS, Body, draw_body
 from tests.blind.second_world.c3d_file import TYPES, write_c3d
-from tests.blind.second_world.drawn_people import drawn_cases
-from tests.blind.second_world.effects import Changes, Hidden, Wobble, changes_of
-from tests.blind.second_world.lab import Lab, Recorded
+from tests.blind.second_world.effects import Changes, Hidden, changes_of, wobble
+from tests.blind.second_world.lab import Equipment, Lab, Recorded
 from tests.blind.second_world.landmarks import place_landmarks
 from tests.blind.second_world.movements import moving
-from tests.blind.second_world.people import CASES, Case
+from tests.blind.second_world.people import CASES, Case, drawn_cases
 from tests.blind.second_world.skin import Skin
 
 LENGTH_S, SEED = 3.0, 11
@@ -37,7 +36,7 @@ def found(body: Body) -> Balanced:
 
 
 def lab_of(plate_type: int = 2) -> Lab:
-    return Lab("hansen2017", 100, 1000, plate_type, True, np.random.default_rng(SEED))
+    return Lab(Equipment("hansen2017", 100, plate_type, True), np.random.default_rng(SEED))
 
 
 def recorded(body: Body, found: Balanced, lab: Lab, changes: Changes) -> Recorded:
@@ -60,9 +59,9 @@ def total_in_file(path: Path, lab: Lab) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_body_weighs_what_it_should(body):
-    assert sum(body.masses_kg.values()) == pytest.approx(62.0)
+    assert sum(part.mass for part in body.parts.values()) == pytest.approx(62.0)
     for segment in SEGMENTS:
-        moments = np.linalg.eigvalsh(body.inertias_kgm2[segment])
+        moments = np.linalg.eigvalsh(body.parts[segment].inertia)
         assert moments[0] > 0.0 and moments[0] + moments[1] > 0.95 * moments[2]
 
 
@@ -129,7 +128,7 @@ def test_what_wobbles_swings_on_and_weighs_nothing_more(body):
     """A third of a second after a jolt the ground still feels it, by less and less."""
     times = np.arange(0.0, 3.0, 0.002)
     velocity = np.outer(np.where(times > 1.0, -0.5, 0.0), [0.0, 0.0, 1.0])
-    force = Wobble("pelvis", np.zeros(3), 4.0).on_ground(times, velocity)[:, 2]
+    force = wobble(4.0)(times, velocity)[:, 2]
     early, later = (np.abs(force[(times > a) & (times < a + 0.25)]).max() for a in (1.05, 1.3))
     assert 5.0 < later < 0.3 * early
     assert np.abs(force[times > 2.8]).max() < 0.5

@@ -126,6 +126,9 @@ def test_few_trials_that_are_otherwise_cost_the_others_nothing(sound, odd):
     assert assemble(trials[0], found).plates
     without = assemble(trials[-1], found)
     assert not without.plates and "the other trials" in without.forces_note
+    doubts = [one for one in findings_about(found) if one.level == "warning"]
+    assert len(doubts) == (len(odd) == sound)  # no majority
+    assert all("in odd0" in one.found for one in doubts)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from bsip_cli.simulate.effects import drawn
-from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.effects import Effect, drawn
 from bsip_cli.simulate.options import Asked, Laboratory, Rates
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.recording import MM, Measurement, Trial, measure_trial, simulate_trial

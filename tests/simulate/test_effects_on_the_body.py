@@ -97,7 +97,7 @@ def test_a_constant_force_takes_itself_off_the_plate():
 def test_an_object_weighs_from_picking_up_to_putting_down():
     trial = trial_with("static", ("object_handled", 2.0, "hand_l"))
     effect = effect_of("object_handled", 2.0, "hand_l")
-    start, end = (round(1000 * t) for t in effect.window_s(DURATION_S["static"]))
+    start, end = (round(1000 * share * DURATION_S["static"]) for share in effect.window_share)
     weight, force = weight_n(), trial.force_n[:, 1]
     assert force[start + 60 : end - 60].mean() == pytest.approx(weight + 2.0 * G, abs=0.5)
     for part in (slice(20, start - 60), slice(end + 60, -20)):
@@ -138,7 +138,7 @@ def test_a_wobbling_mass_rings_at_its_frequency_and_hangs_still_at_rest():
     place = np.zeros((4000, 3))
     place[:, 1] = 0.01 * np.clip((t - 0.5) / 0.05, 0.0, 1.0) ** 2 * (t < 0.55) + 0.01 * (t >= 0.55)
     poses = Poses({"b": np.broadcast_to(np.eye(3), (4000, 3, 3))}, {"b": place}, np.zeros(4000))
-    swing = Swinging("b", 2.0, np.zeros(3), 5.0, 0.1)
+    swing = Swinging("b", np.zeros(3), 2.0, 5.0, 0.1)
     force, moment = swing.wrench(poses, 0.001)
     assert np.abs(force[:450] - [0.0, 2.0 * G, 0.0]).max() < 1e-6
     ring = force[600:, 1] - 2.0 * G

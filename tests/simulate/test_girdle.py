@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.simulate.kinematics import RHYTHM_RAD, clavicle_turn
 from bsip_cli.simulate.numerics import euler_zxy, rotate, transpose
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import draw_person
+from bsip_cli.simulate.plan import RHYTHM_RAD, clavicle_turn
 from bsip_cli.simulate.recording import simulate_trial
 
 PLAIN = Richness()

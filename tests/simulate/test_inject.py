@@ -12,8 +12,7 @@ import pytest
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.simulate.effects import drawn
-from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.effects import Effect, drawn
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness
 from bsip_cli.simulate.recording import measure_trial, write_trial
 from bsip_cli.simulate.study import inject_command, inject_recording

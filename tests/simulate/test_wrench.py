@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.simulate.kinematics import ground_wrench, momentum_of
+from bsip_cli.simulate.balance import ground_wrench, momentum_of
 from bsip_cli.simulate.numerics import about_z
 from bsip_cli.simulate.people import Inertia
 from bsip_cli.simulate.plan import GRAVITY, Poses

@@ -1,4 +1,4 @@
-"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`."""
+"""Effects hidden in recordings, as they are asked for, drawn and chosen for a trial."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from bsip_cli.errors import UsageError
 from bsip_cli.segments import SEGMENTS
-from bsip_cli.simulate.effects import instruments, loads  # noqa: F401
-from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, OnSegment, Target
+from bsip_cli.simulate.effects import instruments, loads  # noqa: F401 (they enter EFFECTS)
+from bsip_cli.simulate.effects.base import EFFECTS, NOWHERE, Effect, OnSegment, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
-EFFECTS = {name: KINDS[name] for name in TABLE}
+__all__ = ["EFFECTS", "Effect", "drawn", "effects_of", "pair_up", "touches"]
 NO_TARGET = ("", "-")
 EFFECT = 4  # the stream of random numbers, next to those of `study`
 
@@ -40,8 +40,7 @@ def pair_up(
         if len(found) not in allowed:
             raise UsageError(f"{len(names)} effects with {len(found)} {what}", expected=rule)
     asked = tuple(map(Asked, names, sizes, targets or [""] * len(names)))
-    for one in asked:
-        effect = drawn(one, np.random.default_rng(0))
+    for effect in (drawn(one, np.random.default_rng(0)) for one in asked):
         if simulated and isinstance(effect, OnSegment) and effect.segment not in SEGMENTS:
             raise effect.wrong_target(effect.segment)  # only measured data can have it
         if not simulated and not effect.injectable:
@@ -60,18 +59,14 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
             f"{asked.name} of size {asked.size:g}",
             expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
         )
-    name, settings = "", dict[str, float]()
-    for part in asked.target.split(",") if asked.target not in NO_TARGET else []:
-        key, equals, number = part.partition("=")
-        if not equals and not name and not settings:
-            name = part
-            continue
-        try:
-            settings[key] = float(number)
-        except ValueError as error:
-            raise kind.wrong_target(asked.target) from error
-        if key not in kind.settings:
-            raise kind.wrong_target(asked.target)
+    first, *rest = ("" if asked.target in NO_TARGET else asked.target).split(",")
+    name, rest = ("", [first, *rest]) if "=" in first else (first, rest)
+    try:
+        settings = {key: float(number) for key, number in (part.split("=") for part in rest)}
+    except ValueError as error:
+        raise kind.wrong_target(asked.target) from error
+    if not settings.keys() <= set(kind.settings):
+        raise kind.wrong_target(asked.target)
     if name and (kind.targets == NOWHERE or name not in (kind.choices or [name])):
         raise kind.wrong_target(name)
     return kind.draw(asked.size, Target(name, settings), rng)
@@ -79,13 +74,12 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
 
 def effects_of(options: StudyOptions, number: int) -> tuple[Effect, ...]:
     """The effects of a participant; those of the lab are the same for all."""
-    owners = (number if EFFECTS[one.name].personal else 0 for one in options.effects)
+    kinds = (EFFECTS[one.name] for one in options.effects)
+    owners = (number if kind.drawn_for == "person" else 0 for kind in kinds)
     seeds = ([options.seed, owner, EFFECT, index] for index, owner in enumerate(owners))
     return tuple(map(drawn, options.effects, map(np.random.default_rng, seeds)))
 
 
 def touches(effect: Effect, task: str, tasks: tuple[str, ...]) -> bool:
     """Whether the effect is in the trials of a task; `tasks` as asked for, or empty."""
-    if tasks:
-        return task in tasks
-    return not (effect.spares_static and task == "static")
+    return task in tasks if tasks else not (effect.spares_static and task == "static")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Self
+from typing import Any
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -16,16 +16,47 @@ from scipy.signal import butter, sosfiltfilt
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import COMPONENTS, Instruments, SensingPlate
 from bsip_cli.segments import SEGMENTS
-from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction, span
+from bsip_cli.simulate.effects.base import (
+    JOINTS,
+    Effect,
+    Target,
+    by,
+    direction,
+    named,
+    setting,
+    span,
+    uniform,
+)
 from bsip_cli.simulate.numerics import frame_of, from_rotation_vector, glide, rotate, runs, step
 from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import Plan
 
-AXES = ("x", "y", "z")
-TURNS = {"yaw": 2, "tilt_x": 0, "tilt_y": 1}
+TURNS = {"x": 0, "y": 1, "z": 2, "tilt_x": 0, "tilt_y": 1, "yaw": 2}
+"""Lab axes by the names of targets."""
 
 
-# --- clocks ---------------------------------------------------------------------------------------
+def along_an_axis(usual: str = "") -> Any:
+    """(3,) the size along a lab axis, or along a drawn horizontal direction."""
+
+    def draw(size: float, target: Target, rng: np.random.Generator) -> np.ndarray:
+        heading, name = rng.uniform(-np.pi, np.pi), target.name or usual
+        drawn = np.array([np.cos(heading), np.sin(heading), 0.0])
+        return size * (np.eye(3)[TURNS[name]] if name else drawn)
+
+    return by(draw)
+
+
+def part_of_name(index: int, separator: str, usual: str) -> Any:
+    """What stands before (0) or after (2) the separator in the target's name."""
+    return by(lambda size, target, rng: (target.name or usual).partition(separator)[index])
+
+
+def number_below(count: int) -> Any:
+    """A whole number drawn from 0 to count - 1."""
+    return by(lambda size, target, rng: int(rng.integers(count)))
+
+
+# --- clocks and axes ------------------------------------------------------------------------------
 
 
 class SyncOffset(Effect, name="sync_offset"):
@@ -49,25 +80,14 @@ class FrameRate(Effect, name="frame_rate"):
         return instruments.said_slower(1.0 + self.size)
 
 
-# --- plates ---------------------------------------------------------------------------------------
-
-
-class TurnedAxes(Effect):
-    """turn_rad : rotation vector, lab axes."""
-
-    turn_rad: np.ndarray
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, size * _axis(target.name, rng))
-
-
-class GravityTilt(TurnedAxes, name="gravity_tilt"):
-    """The lab's axes are turned against the world by turn_rad.
+class GravityTilt(Effect, name="gravity_tilt"):
+    """The lab's axes are turned against the world by turn_rad (rotation vector, lab axes).
 
     Markers and forces turn together about the first plate's centre, so that the physics
     stays whole; only gravity no longer points down the lab's vertical.
     """
+
+    turn_rad: np.ndarray = along_an_axis()
 
     def measured(self, instruments: Instruments) -> Instruments:
         turn, pivot = from_rotation_vector(self.turn_rad), instruments.plates[0].centre_m
@@ -79,18 +99,26 @@ class GravityTilt(TurnedAxes, name="gravity_tilt"):
         return replace(instruments, points_m=points, readings=np.stack(readings))
 
 
-class CameraFrame(TurnedAxes, name="camera_frame"):
-    """All markers are turned by turn_rad about the lab's origin."""
+class CameraFrame(Effect, name="camera_frame"):
+    """All markers are turned by turn_rad (rotation vector, lab axes) about the lab's origin."""
+
+    turn_rad: np.ndarray = along_an_axis()
 
     def measured(self, instruments: Instruments) -> Instruments:
         turn = from_rotation_vector(self.turn_rad)
         return replace(instruments, points_m=instruments.points_m @ turn.T)
 
 
-class OfEveryPlate(Effect, ABC):
-    """A plate reads otherwise, or each of them."""
+# --- plates and their channels --------------------------------------------------------------------
 
-    plate = 0  # its number; 0 for all
+
+class OfEveryPlate(Effect, ABC):
+    """A plate reads otherwise, or each of them.
+
+    at : as in the table, of a single plate; what follows "of" is left out if it is all of them.
+    """
+
+    plate: int = by(lambda size, target, rng: int(target.settings.get("plate", 0)))
 
     def measured(self, instruments: Instruments) -> Instruments:
         number, count = self.plate, len(instruments.plates)
@@ -107,21 +135,15 @@ class OfEveryPlate(Effect, ABC):
         """Change a plate's true reading (N, 6) into what it shows, at times (N,)."""
 
     def place(self) -> str:
-        return f"plate {self.plate}" if self.plate else "all plates"
+        channel = super().place()
+        plate = f"plate {self.plate}" if self.plate else ""
+        return " of ".join(filter(None, (channel, plate))) or "all plates"
 
 
 class PlateTranslation(OfEveryPlate, name="plate_translation"):
-    """The plate truly lies at its stated place plus shift_m (lab axes).
+    """The plate truly lies at its stated place plus shift_m (lab axes)."""
 
-    plate : its number, or 0 for all of them.
-    """
-
-    shift_m: np.ndarray
-    plate: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, size * _axis(target.name, rng), int(target.get("plate", 0)))
+    shift_m: np.ndarray = along_an_axis()
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         reading[:, 3:] -= np.cross(plate.axes.T @ self.shift_m, reading[:, :3])
@@ -130,13 +152,7 @@ class PlateTranslation(OfEveryPlate, name="plate_translation"):
 class PlateRotation(OfEveryPlate, name="plate_rotation"):
     """The plate is truly turned by turn_rad (rotation vector, lab axes) about its centre."""
 
-    turn_rad: np.ndarray
-    plate: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        axis = np.eye(3)[TURNS[target.name or "yaw"]]
-        return cls(size, size * axis, int(target.get("plate", 0)))
+    turn_rad: np.ndarray = along_an_axis("yaw")
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         force, moment = plate.lab_wrench(reading, plate.centre_m)
@@ -144,47 +160,44 @@ class PlateRotation(OfEveryPlate, name="plate_rotation"):
         reading[:] = plate.reading(force @ turn, moment @ turn, plate.centre_m)
 
 
-def _axis(name: str, rng: np.random.Generator) -> np.ndarray:
-    """(3,) a lab axis, or a drawn horizontal direction."""
-    heading = rng.uniform(-np.pi, np.pi)
-    drawn = np.array([np.cos(heading), np.sin(heading), 0.0])
-    return np.eye(3)[AXES.index(name)] if name else drawn
+class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
+    """Channel `to` shows size times channel `source` plus its own."""
 
+    source: str = part_of_name(0, ":", "fz:fx")
+    to: str = part_of_name(2, ":", "fz:fx")
 
-# --- channels -------------------------------------------------------------------------------------
-
-
-class ChannelFault(OfEveryPlate):
-    """An error of one channel. plate : its number, or 0 for all."""
-
-    channel: str
-    plate: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, target.name or "fz", int(target.get("plate", 0)))
+    def __post_init__(self) -> None:
+        if self.source == self.to or not {self.source, self.to} <= set(COMPONENTS):
+            raise self.wrong_target(f"{self.source}:{self.to}")
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
-        column = COMPONENTS.index(self.channel)
-        reading[:, column] = self.shown(reading[:, column], times_s)
-
-    @abstractmethod
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        """What the channel (N,) shows instead of its true values."""
-
-    def place(self) -> str:
-        return self.channel + (f" of plate {self.plate}" if self.plate else "")
+        source, to = COMPONENTS.index(self.source), COMPONENTS.index(self.to)
+        reading[:, to] += self.size * reading[:, source]
 
 
-class PlateGain(ChannelFault, name="plate_gain"):
+class OfOneChannel(OfEveryPlate):
+    """One channel shows something else than the truth."""
+
+    channel: str = named("fz")
+
+    @property
+    def column(self) -> int:
+        """Of a reading."""
+        return COMPONENTS.index(self.channel)
+
+
+class PlateGain(OfOneChannel, name="plate_gain"):
     """The channel shows 1 + size times the truth."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return (1.0 + self.size) * values
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, self.column] *= 1.0 + self.size
 
 
-class OwnSignal(ChannelFault):
-    """Something is added to the channel, whatever it measures."""
+class PlateZero(OfOneChannel, name="plate_zero"):
+    """A constant is added to the channel, whatever it measures."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, self.column] += self.size
 
     def injected(self, instruments: Instruments) -> Instruments:
         """What the software that wrote the file has set to zero stays so."""
@@ -193,40 +206,11 @@ class OwnSignal(ChannelFault):
         return replace(changed, readings=np.where(silent, 0.0, changed.readings))
 
 
-class PlateZero(OwnSignal, name="plate_zero"):
-    """A constant is added to the channel."""
-
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return values + self.size
-
-
-class PlateDrift(OwnSignal, name="plate_drift"):
+class PlateDrift(PlateZero, name="plate_drift"):
     """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
 
-    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        return values + self.size * times_s
-
-
-class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
-    """Channel `to` shows size times channel `source` plus its own."""
-
-    source: str
-    to: str
-    plate: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        source, _, to = (target.name or "fz:fx").partition(":")
-        if source not in COMPONENTS or to not in COMPONENTS or source == to:
-            raise cls.wrong_target(target.name)
-        return cls(size, source, to, int(target.get("plate", 0)))
-
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
-        source, to = COMPONENTS.index(self.source), COMPONENTS.index(self.to)
-        reading[:, to] += self.size * reading[:, source]
-
-    def place(self) -> str:
-        return f"{self.source}:{self.to}" + (f" of plate {self.plate}" if self.plate else "")
+        reading[:, self.column] += self.size * times_s
 
 
 # --- markers --------------------------------------------------------------------------------------
@@ -240,113 +224,100 @@ LEAST_FRAMES = 15  # a shorter interval between gaps is not smoothed
 
 
 class OnSkin(Effect):
-    """A marker moves along the skin, and stays there.
+    """A marker moves along the skin, and stays there."""
 
-    along : (3,) unit vector in the frame of the three markers that keep their distance to it best.
-    """
+    marker: str = by(lambda size, target, rng: target.name)
+    draw_of_marker: int = number_below(1 << 16)
 
-    marker: str
-    draw_of_marker: int
-    along: np.ndarray
+    def slipped(self, instruments: Instruments, along: np.ndarray, gone: np.ndarray) -> Instruments:
+        """Instruments with the marker moved by the part gone (F,) of `size`.
 
-    def measured(self, instruments: Instruments) -> Instruments:
+        along : (3,) in the frame of the three markers that keep their distance to it best.
+        """
         drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
-        column = instruments.column(self.marker or drawn)
-        way = self.size * self.moved(instruments.frame_times_s())
-        points = instruments.points_m.copy()
+        column, points = instruments.column(self.marker or drawn), instruments.points_m.copy()
         distance = np.linalg.norm(points - points[:, [column]], axis=2)
-        seen = np.isfinite(distance).mean(axis=0)
-        spread = np.nanstd(np.where(seen > 0.5, distance, 0.0), axis=0)
-        spread = np.where(seen > 0.5, spread, np.inf)
-        spread[column] = np.inf
+        seen = np.isfinite(distance).mean(axis=0) > 0.5
+        seen[column] = False
+        spread = np.where(seen, np.nanstd(np.where(seen, distance, 0.0), axis=0), np.inf)
         a, b, c = points[:, np.argsort(spread, kind="stable")[:COMPANIONS]].transpose(1, 0, 2)
         # NaN where a companion is lost: then that frame of the marker is lost too
-        points[:, column] += way[:, None] * rotate(frame_of(b - a, c - a), self.along)
+        way = (self.size * gone)[:, None] * rotate(frame_of(b - a, c - a), along)
+        points[:, column] += way
         return replace(instruments, points_m=points)
-
-    @abstractmethod
-    def moved(self, times_s: np.ndarray) -> np.ndarray:
-        """(F,) part of the way that it has gone, 0 to 1."""
 
 
 class MarkerShift(OnSkin, name="marker_shift"):
     """A marker slips along the skin, within SLIP_S, and stays there.
 
     from_share : the part of a trial after which it slips, unless from_s is given.
+    along : (3,) unit vector in the frame of the markers beside it.
     """
 
-    from_share: float
-    from_s: float | None
+    from_share: float = uniform(0.2, 0.6)
+    from_s: float | None = setting("from_s")
+    along: np.ndarray = by(lambda size, target, rng: direction(rng))
 
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        number, share = int(rng.integers(1 << 16)), float(rng.uniform(0.2, 0.6))
-        from_s = target.settings.get("from_s")
-        return cls(size, target.name, number, direction(rng), share, from_s)
-
-    def moved(self, times_s: np.ndarray) -> np.ndarray:
-        start = self.from_share * times_s[-1] if self.from_s is None else self.from_s
-        return step(times_s, start, start + SLIP_S)
+    def measured(self, instruments: Instruments) -> Instruments:
+        times = instruments.frame_times_s()
+        start = self.from_share * times[-1] if self.from_s is None else self.from_s
+        return self.slipped(instruments, self.along, step(times, start, start + SLIP_S))
 
 
 class MarkerSlide(OnSkin, name="marker_slide"):
     """A marker slides along the skin for a part of the trial, and stays there.
 
     window_share : start and end as parts of a trial.
+    along : (3,) unit vector in the frame of the markers beside it.
     """
 
-    window_share: tuple[float, float]
+    window_share: tuple[float, float] = span(0.1, 0.4, 0.3, 0.5)
+    along: np.ndarray = by(lambda size, target, rng: direction(rng))
 
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        number, share = int(rng.integers(1 << 16)), span(rng, 0.1, 0.4, 0.3, 0.5)
-        return cls(size, target.name, number, direction(rng), share)
-
-    def moved(self, times_s: np.ndarray) -> np.ndarray:
-        start, end = (share * times_s[-1] for share in self.window_share)
-        return glide(times_s, start, end, SOFT * (end - start))
+    def measured(self, instruments: Instruments) -> Instruments:
+        times = instruments.frame_times_s()
+        start, end = (share * times[-1] for share in self.window_share)
+        gone = glide(times, start, end, SOFT * (end - start))
+        return self.slipped(instruments, self.along, gone)
 
 
 class MarkerSwap(Effect, name="marker_swap"):
     """Two markers carry each other's label for `size` seconds.
 
+    draw_of_pair : of the closest pairs, unless first and second are given.
     start_share : where the window lies in each trial, 0 at its start and 1 at its end,
         unless start_s is given.
     """
 
-    first: str
-    second: str
-    draw_of_pair: int
-    start_share: float
-    start_s: float | None
+    first: str = part_of_name(0, "+", "")
+    second: str = part_of_name(2, "+", "")
+    draw_of_pair: int = number_below(CLOSE_PAIRS)
+    start_share: float = uniform(0.2, 0.8)
+    start_s: float | None = setting("start_s")
 
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        first, _, second = target.name.partition("+")
-        if bool(first) != bool(second) or (first and first == second):
-            raise cls.wrong_target(target.name)
-        number, share = int(rng.integers(CLOSE_PAIRS)), float(rng.uniform(0.2, 0.8))
-        return cls(size, first, second, number, share, target.settings.get("start_s"))
+    def __post_init__(self) -> None:
+        if bool(self.first) != bool(self.second) or (self.first and self.first == self.second):
+            raise self.wrong_target(f"{self.first}+{self.second}")
 
     def measured(self, instruments: Instruments) -> Instruments:
         if self.first:
             a, b = instruments.column(self.first), instruments.column(self.second)
         else:
-            points = np.nanmedian(instruments.points_m, axis=0)
-            distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-            distance[np.tril_indices(len(points))] = np.inf
+            places = np.nanmedian(instruments.points_m, axis=0)
+            distance = np.linalg.norm(places[:, None] - places[None], axis=2)
+            distance[np.tril_indices(len(places))] = np.inf
             flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
             a, b = map(int, np.unravel_index(flat, distance.shape))
         times = instruments.frame_times_s()
         free = max(times[-1] - self.size, 0.0)
         start = self.start_share * free if self.start_s is None else self.start_s
-        inside = np.flatnonzero((times >= start) & (times < start + self.size))
+        inside = np.flatnonzero((times >= start) & (times < start + self.size))[:, None]
         points = instruments.points_m.copy()
-        points[inside, a], points[inside, b] = points[inside, b].copy(), points[inside, a].copy()
+        points[inside, [a, b]] = points[inside, [b, a]]
         return replace(instruments, points_m=points)
 
     def place(self) -> str:
-        return f"{self.first}+{self.second}" if self.first else ""
+        return super().place().strip("+")  # nothing where the pair is drawn in each recording
 
 
 class OverSmoothing(Effect, name="over_smoothing"):
@@ -382,13 +353,8 @@ class JointCentre(Effect, name="joint_centre"):
     landmarks are palpated wrongly by the opposite shift.
     """
 
-    joint: str
-    shift_m: np.ndarray
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        joint = target.name or str(rng.choice(JOINTS))
-        return cls(size, joint, size * direction(rng))
+    joint: str = named(*JOINTS)
+    shift_m: np.ndarray = by(lambda size, target, rng: size * direction(rng))
 
     def person(self, person: Person) -> Person:
         kind, side = self.joint[:-2], self.joint[-1]
@@ -425,11 +391,7 @@ class SegmentInertia(Effect, name="segment_inertia"):
     moves away from the segment's origin by half of `size`, the origin's distance being 1.
     """
 
-    segment: str
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, target.name or str(rng.choice(SEGMENTS)))
+    segment: str = named(*SEGMENTS)
 
     def person(self, person: Person) -> Person:
         own = ("abdomen", "thorax") if self.segment == "upper_torso" else (self.segment,)

@@ -13,17 +13,28 @@ from bsip_cli.body.markersets import load_marker_set, shipped_names
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.segments import SEGMENTS
-from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of, span, with_body
+from bsip_cli.simulate.effects.base import (
+    Effect,
+    OnSegment,
+    Target,
+    body_of,
+    by,
+    named,
+    setting,
+    span,
+    uniform,
+    with_body,
+)
 from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
 from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import GRAVITY, Ball, G, Load, Plan, Poses
 
-HANDS = ["hand_l", "hand_r"]
+HANDS = ("hand_l", "hand_r")
+HEAVY = ("thigh_l", "thigh_r", "upper_torso", "lower_torso")
 BALL_RADIUS_M = 0.03
 OFF_AXIS_M, ALONG_M = 0.05, 0.05
-IN_FRONT_M = 0.04
+IN_FRONT_M = np.array([0.04, 0.0, 0.0])
 OPENING_S = 0.04
-HEAVY = ("thigh_l", "thigh_r", "upper_torso", "lower_torso")
 MOST_OF_SEGMENT = 0.8
 OUTWARD = np.array([0.8, 0.6, 0.0])  # of the chest: ahead and up, thorax axes
 RAMP_S = 0.4
@@ -38,20 +49,29 @@ CUTOFF_HZ = 10.0
 LOADED_N = 40.0
 
 
+def beside_the_axis(size: float, target: Target, rng: np.random.Generator) -> np.ndarray:
+    """(3,) OFF_AXIS_M aside and up to ALONG_M along a segment."""
+    angle, along = rng.uniform(-np.pi, np.pi), rng.uniform(-ALONG_M, ALONG_M)
+    return np.array([OFF_AXIS_M * np.cos(angle), along, OFF_AXIS_M * np.sin(angle)])
+
+
+def mostly_upwards(size: float, target: Target, rng: np.random.Generator) -> np.ndarray:
+    """(3,) unit vector, walkway axes (Y up)."""
+    aside, heading = rng.uniform(0.0, MOST_ASIDE), rng.uniform(-np.pi, np.pi)
+    return np.array([aside * np.cos(heading), np.sqrt(1 - aside**2), aside * np.sin(heading)])
+
+
+# --- carried --------------------------------------------------------------------------------------
+
+
 class AddedMass(OnSegment, name="added_mass"):
     """A small ball of `size` kg on a segment, as of a bag or a cast; the scale did not see it.
 
     offset_m : (3,) from the segment's centre of mass, segment axes.
     """
 
-    offset_m: np.ndarray
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(SEGMENTS))
-        angle, along = rng.uniform(-np.pi, np.pi), rng.uniform(-ALONG_M, ALONG_M)
-        aside = OFF_AXIS_M * np.array([np.cos(angle), 0.0, np.sin(angle)])
-        return cls(size, segment, aside + np.array([0.0, along, 0.0]))
+    segment: str = named(*SEGMENTS)
+    offset_m: np.ndarray = by(beside_the_axis)
 
     def position_m(self, person: Person) -> np.ndarray:
         return super().position_m(person) + self.offset_m
@@ -71,16 +91,12 @@ class ReleasedObject(OnSegment, name="released_object"):
     release_share : when, as a part of each trial, unless release_s is given.
     """
 
-    release_share: float
-    release_s: float | None
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment, share = target.name or str(rng.choice(HANDS)), float(rng.uniform(0.35, 0.65))
-        return cls(size, segment, share, target.settings.get("release_s"))
+    segment: str = named(*HANDS)
+    release_share: float = uniform(0.35, 0.65)
+    release_s: float | None = setting("release_s")
 
     def position_m(self, person: Person) -> np.ndarray:
-        return super().position_m(person) + np.array([IN_FRONT_M, 0.0, 0.0])
+        return super().position_m(person) + IN_FRONT_M
 
     def _hold(self, times_s: np.ndarray, length_s: float) -> tuple[np.ndarray, float]:
         """1 while held, 0 when gone, with an opening hand of OPENING_S between; and the release."""
@@ -89,13 +105,63 @@ class ReleasedObject(OnSegment, name="released_object"):
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         hold, release = self._hold(plan.recorded_times_s(), plan.recorded_length_s())
-        place = self.position_m(person)
-        return plan.with_load(Ball(body_of(self.segment), self.size, place, hold, release))
+        return plan.with_load(Ball(*self.where(person), self.size, hold, release))
 
     def injected(self, instruments: Instruments) -> Instruments:
         length = len(instruments.points_m) / instruments.marker_hz
         hold, _ = self._hold(instruments.sample_times_s(), length)
         return with_mass_at(instruments, self.segment, self.size, hold)
+
+
+class ObjectHandled(OnSegment, name="object_handled"):
+    """A point mass of `size` kg that a segment picks up and puts down again, beside the plates.
+
+    window_share : start and end as parts of each trial.
+    """
+
+    segment: str = named(*HANDS)
+    window_share: tuple[float, float] = span(0.2, 0.35, 0.25, 0.4)
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        start, end = (share * plan.recorded_length_s() for share in self.window_share)
+        half = 0.5 * OPENING_S
+        hold = window(plan.recorded_times_s(), start - half, end + half, OPENING_S)
+        body, place = self.where(person)
+        return plan.with_load(Ball(body, place + IN_FRONT_M, self.size, hold, end))
+
+
+class Implement(OnSegment, name="implement"):
+    """Two balls of `size` kg together on a line through the hand's centre of mass, held through
+    each trial.
+
+    centre_m : (3,) of both from there, hand's axes. spread_m : of each from their common centre.
+    """
+
+    centre_m: np.ndarray
+    spread_m: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        hand = target.name or str(rng.choice(HANDS))
+        distance = target.settings.get("distance", float(rng.uniform(*CENTRES_M)))
+        azimuth, out = rng.uniform(-np.pi, np.pi), rng.uniform(-MOST_TILT_RAD, MOST_TILT_RAD)
+        flat = np.cos(out)
+        axis = np.array([np.sin(out), flat * np.cos(azimuth), flat * np.sin(azimuth)])
+        return cls(size, hand, distance * axis, distance * float(rng.uniform(*SPREADS)))
+
+    def body(self, person: Person) -> Person:
+        distance = float(np.linalg.norm(self.centre_m))
+        axis = self.centre_m / max(distance, LEAST_RADIUS_M)
+        across = self.spread_m**2 * (np.eye(3) - np.outer(axis, axis))
+        tensor = self.size * (across + LEAST_RADIUS_M**2 * np.eye(3))
+        held = Inertia(self.size, self.position_m(person) + self.centre_m, tensor)
+        return with_body(person, self.segment, held)
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        return {"distance_m": float(np.linalg.norm(self.centre_m))}
+
+
+# --- swinging -------------------------------------------------------------------------------------
 
 
 class WobblingMass(OnSegment, name="wobbling_mass"):
@@ -105,20 +171,9 @@ class WobblingMass(OnSegment, name="wobbling_mass"):
     mass stay the person's.
     """
 
-    frequency_hz: float
-    damping_ratio: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(HEAVY))
-        frequency = target.get("frequency", float(rng.uniform(3.5, 7.0)))
-        damping = target.get("damping", float(rng.uniform(0.1, 0.3)))
-        if not 0.5 <= frequency <= 20.0 or not 0.01 <= damping <= 1.0:
-            raise UsageError(
-                f"a wobbling mass of {frequency:g} Hz with damping {damping:g}",
-                expected="0.5 to 20 Hz and 0.01 to 1",
-            )
-        return cls(size, segment, frequency, damping)
+    segment: str = named(*HEAVY)
+    frequency_hz: float = uniform(3.5, 7.0, "frequency", 0.5, 20.0, "Hz")
+    damping_ratio: float = uniform(0.1, 0.3, "damping", 0.01, 1.0)
 
     def position_m(self, person: Person) -> np.ndarray:
         return person.inertias[body_of(self.segment)].com_m
@@ -132,13 +187,12 @@ class WobblingMass(OnSegment, name="wobbling_mass"):
                 f"{self.size:g} kg of {self.segment} cannot wobble",
                 expected=f"at most {MOST_OF_SEGMENT * part.mass_kg:.1f} kg, 80 % of the segment",
             )
-        rest = Inertia(part.mass_kg - self.size, part.com_m, part.tensor_kgm2)
+        rest = replace(part, mass_kg=part.mass_kg - self.size)
         return replace(person, inertias={**person.inertias, body: rest})
 
     def plan(self, person: Person, plan: Plan) -> Plan:
-        body, place = body_of(self.segment), self.position_m(person)
-        swinging = Swinging(body, self.size, place, self.frequency_hz, self.damping_ratio)
-        return plan.with_load(swinging)
+        tissue = self.size, self.frequency_hz, self.damping_ratio
+        return plan.with_load(Swinging(*self.where(person), *tissue))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,9 +202,7 @@ class Swinging(Load):
     Its displacement u against that point r obeys u'' + 2 z w u' + w^2 u = -r''.
     """
 
-    body: str
     mass_kg: float
-    position_m: np.ndarray
     frequency_hz: float
     damping_ratio: float
 
@@ -169,15 +221,8 @@ class Swinging(Load):
 class Breathing(Effect, name="breathing"):
     """Moved mass times amplitude is `size`; it moves as a sine at the chest."""
 
-    frequency_hz: float
-    phase_rad: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        frequency = target.get("frequency", float(rng.uniform(0.2, 0.32)))
-        if not 0.05 <= frequency <= 2.0:
-            raise UsageError(f"breathing at {frequency:g} Hz", expected="0.05 to 2 Hz")
-        return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
+    frequency_hz: float = uniform(0.2, 0.32, "frequency", 0.05, 2.0, "Hz")
+    phase_rad: float = uniform(-np.pi, np.pi)
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         times = plan.recorded_times_s()
@@ -190,8 +235,6 @@ class Breathing(Effect, name="breathing"):
 class ChestMotion(Load):
     """Mass that leaves its place in a body: mass times displacement (T, 3), body axes."""
 
-    body: str
-    position_m: np.ndarray
     dipole_kgm: np.ndarray
 
     def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -202,6 +245,9 @@ class ChestMotion(Load):
         return force, np.cross(r, force) + np.cross(dipole, acceleration - GRAVITY)
 
 
+# --- held from outside ----------------------------------------------------------------------------
+
+
 class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
     """A mostly upward force on a segment, as of a rail on a hand, of `size` N on average.
 
@@ -210,18 +256,12 @@ class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
     Near a flight the person lets go.
     """
 
-    window_share: tuple[float, float]
-    start_s: float | None
-    end_s: float | None
-    heading_rad: float
-    phase_rad: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment, share = target.name or str(rng.choice(HANDS)), span(rng, 0.15, 0.35, 0.3, 0.45)
-        start_s, end_s = target.settings.get("start_s"), target.settings.get("end_s")
-        heading, phase = rng.uniform(-np.pi, np.pi, 2).tolist()
-        return cls(size, segment, share, start_s, end_s, heading, phase)
+    segment: str = named(*HANDS)
+    window_share: tuple[float, float] = span(0.15, 0.35, 0.3, 0.45)
+    start_s: float | None = setting("start_s")
+    end_s: float | None = setting("end_s")
+    heading_rad: float = uniform(-np.pi, np.pi)
+    phase_rad: float = uniform(-np.pi, np.pi)
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         times = plan.recorded_times_s()
@@ -237,24 +277,7 @@ class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
             strength *= 1.0 - window(times, a, b, CLEAR_OF_FLIGHT_S)
         aside = ASIDE * np.array([np.cos(self.heading_rad), 0.0, np.sin(self.heading_rad)])
         force = self.size * strength[:, None] * (np.array([0.0, 1.0, 0.0]) + aside)
-        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
-
-
-@dataclass(frozen=True, eq=False)
-class Support(Load):
-    """An outside force on a point of the body.
-
-    position_m : (3,) in the body's frame. force_n : (T, 3) on the body.
-    """
-
-    body: str
-    position_m: np.ndarray
-    force_n: np.ndarray
-
-    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the body exerts on the support."""
-        r = poses.point(self.body, self.position_m)
-        return -self.force_n, -np.cross(r, self.force_n)
+        return plan.with_load(Support(*self.where(person), force))
 
 
 class ExternalForce(OnSegment, name="external_force"):
@@ -264,80 +287,28 @@ class ExternalForce(OnSegment, name="external_force"):
     direction : (3,) unit vector, walkway axes (Y up).
     """
 
-    direction: np.ndarray
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(SEGMENTS))
-        aside, heading = rng.uniform(0.0, MOST_ASIDE), rng.uniform(-np.pi, np.pi)
-        up = np.sqrt(1 - aside**2)
-        return cls(size, segment, np.array([aside * np.cos(heading), up, aside * np.sin(heading)]))
+    segment: str = named(*SEGMENTS)
+    direction: np.ndarray = by(mostly_upwards)
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         if plan.flights:
             return plan
         force = np.tile(self.size * self.direction, (len(plan), 1))
-        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
+        return plan.with_load(Support(*self.where(person), force))
 
     def facts(self, person: Person) -> dict[str, Any]:
         return {"upwards_n": float(self.size * self.direction[1])}
 
 
-class ObjectHandled(OnSegment, name="object_handled"):
-    """A point mass of `size` kg that a segment picks up and puts down again, beside the plates.
+@dataclass(frozen=True, eq=False)
+class Support(Load):
+    """An outside force (T, 3) on a point of the body."""
 
-    window_share : start and end as parts of each trial.
-    """
+    force_n: np.ndarray
 
-    window_share: tuple[float, float]
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(HANDS))
-        return cls(size, segment, span(rng, 0.2, 0.35, 0.25, 0.4))
-
-    def window_s(self, length_s: float) -> tuple[float, float]:
-        """Start and end in a trial of this length."""
-        start, end = (share * length_s for share in self.window_share)
-        return start, end
-
-    def plan(self, person: Person, plan: Plan) -> Plan:
-        start, end = self.window_s(plan.recorded_length_s())
-        half = 0.5 * OPENING_S
-        hold = window(plan.recorded_times_s(), start - half, end + half, OPENING_S)
-        place = self.position_m(person) + np.array([IN_FRONT_M, 0.0, 0.0])
-        return plan.with_load(Ball(body_of(self.segment), self.size, place, hold, end))
-
-
-class Implement(OnSegment, name="implement"):
-    """Two balls of `size` kg together on a line through the hand's centre of mass, held through
-    each trial.
-
-    centre_m : (3,) of both from there, hand's axes. spread_m : of each from their common centre.
-    """
-
-    centre_m: np.ndarray
-    spread_m: float
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        hand = target.name or str(rng.choice(HANDS))
-        distance = target.get("distance", float(rng.uniform(*CENTRES_M)))
-        azimuth, out = rng.uniform(-np.pi, np.pi), rng.uniform(-MOST_TILT_RAD, MOST_TILT_RAD)
-        flat = np.cos(out)
-        axis = np.array([np.sin(out), flat * np.cos(azimuth), flat * np.sin(azimuth)])
-        return cls(size, hand, distance * axis, distance * float(rng.uniform(*SPREADS)))
-
-    def body(self, person: Person) -> Person:
-        distance = float(np.linalg.norm(self.centre_m))
-        axis = self.centre_m / max(distance, LEAST_RADIUS_M)
-        across = self.spread_m**2 * (np.eye(3) - np.outer(axis, axis))
-        tensor = self.size * (across + LEAST_RADIUS_M**2 * np.eye(3))
-        held = Inertia(self.size, self.position_m(person) + self.centre_m, tensor)
-        return with_body(person, self.segment, held)
-
-    def facts(self, person: Person) -> dict[str, Any]:
-        return {"distance_m": float(np.linalg.norm(self.centre_m))}
+    def force(self, path_m: np.ndarray, step_s: float) -> np.ndarray:
+        """What the body exerts on the support."""
+        return -self.force_n
 
 
 # --- in measured data -----------------------------------------------------------------------------
@@ -368,13 +339,12 @@ def with_mass_at(
     sign = 1.0 if np.nansum(vertical) > 0.0 else -1.0
     load = np.nan_to_num(sign * vertical)
     load = np.where(load > LOADED_N, load, 0.0)
-    shares = load / np.maximum(load.sum(axis=0), LOADED_N)
-    readings = instruments.readings.copy()
-    for index, plate in enumerate(instruments.plates):
-        part = sign * shares[index][:, None] * force
-        about = plate.sensor_m
-        readings[index] += plate.reading(part, np.cross(place - about, part), about)
-    return replace(instruments, readings=readings)
+    parts = (sign * load / np.maximum(load.sum(axis=0), LOADED_N))[..., None] * force
+    added = [
+        plate.reading(part, np.cross(place - plate.sensor_m, part), plate.sensor_m)
+        for part, plate in zip(parts, instruments.plates, strict=True)
+    ]
+    return replace(instruments, readings=instruments.readings + added)
 
 
 def _smooth_path(instruments: Instruments, where: str) -> np.ndarray:

@@ -6,9 +6,8 @@ the feet until the centre of pressure follows the weight that the feet are to ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -25,15 +24,17 @@ _CART_HEIGHT = 0.95  # of the table-cart model's mass, for a person of the table
 _LEAST_SHARE = 0.015  # of the weight on the lighter foot
 
 
-class Load(Protocol):
-    """Something that the ground has to carry besides the body."""
+OnGround = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Times (N,) [s] and the velocity (N, 3) of a place [m/s] to the ground force (N, 3) [N]."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """Something that the ground has to carry besides the body; place_m (3,) in the segment."""
 
     segment: str
-    place_m: np.ndarray  # (3,) in the segment's frame
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Additional ground force (N, 3) [N]; velocity (N, 3) of the place [m/s]."""
-        ...
+    place_m: np.ndarray
+    on_ground: OnGround
 
 
 @dataclass(frozen=True)
@@ -82,15 +83,15 @@ def ground_wrench(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force [N] and moment about the lab's origin [N m], (N, 3) each."""
     momentum, angular, first_moment = (np.zeros((len(times_s), 3)) for _ in range(3))
-    for segment, mass in body.masses_kg.items():
+    for segment, part in body.parts.items():
         R = poses.rotations[segment]
-        com = poses.points_m(segment, body.coms_m[segment])
+        com = poses.points_m(segment, part.com_m)
         velocity = rate_of(com, times_s)
-        inertia = R @ body.inertias_kgm2[segment] @ R.transpose(0, 2, 1)
+        inertia = R @ part.inertia @ R.transpose(0, 2, 1)
         spin = turned(inertia, _angular_velocity(R, times_s))
-        momentum += mass * velocity
-        angular += mass * np.cross(com, velocity) + spin
-        first_moment += mass * com
+        momentum += part.mass * velocity
+        angular += part.mass * np.cross(com, velocity) + spin
+        first_moment += part.mass * com
     force = rate_of(momentum, times_s) + body.mass_kg * GRAVITY
     moment = rate_of(angular, times_s) + np.cross(first_moment, GRAVITY)
     for load in loads:

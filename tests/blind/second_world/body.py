@@ -14,8 +14,10 @@ deviations from theirs, not a fault of a recording.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -43,32 +45,21 @@ class Row:
     length_mm: float
 
 
+def rows_of(name: str) -> list[dict[str, str]]:
+    """Of a table of this folder."""
+    text = Path(__file__).with_name(name).read_text("utf-8")
+    return list(csv.DictReader(text.splitlines()))
+
+
+def _row(row: dict[str, str]) -> Row:
+    mass, com, x, y, z, length_mm = (float(number) for number in list(row.values())[2:])
+    return Row(mass, com, (x, y, z), length_mm)
+
+
 STATURE_M = {"M": 1.741, "F": 1.735}
 TABLE = {
-    "M": {
-        "head": Row(6.94, 50.02, (30.3, 31.5, 26.1), 242.9),
-        "upper_trunk": Row(15.96, 29.99, (71.6, 45.4, 65.9), 170.7),
-        "middle_trunk": Row(16.33, 45.02, (48.2, 38.3, 46.8), 215.5),
-        "lower_trunk": Row(11.17, 61.15, (61.5, 55.1, 58.7), 145.7),
-        "upper_arm": Row(2.71, 57.72, (28.5, 26.9, 15.8), 281.7),
-        "forearm": Row(1.62, 45.74, (27.6, 26.5, 12.1), 268.9),
-        "hand": Row(0.61, 79.00, (62.8, 51.3, 40.1), 86.2),
-        "thigh": Row(14.16, 40.95, (32.9, 32.9, 14.9), 422.2),
-        "shank": Row(4.33, 43.95, (25.1, 24.6, 10.2), 440.3),
-        "foot": Row(1.37, 44.15, (25.7, 24.5, 12.4), 258.1),
-    },
-    "F": {
-        "head": Row(6.68, 48.41, (27.1, 29.5, 26.1), 243.7),
-        "upper_trunk": Row(15.45, 20.77, (74.6, 50.2, 71.8), 146.5),
-        "middle_trunk": Row(14.65, 45.12, (43.3, 35.4, 41.5), 211.0),
-        "lower_trunk": Row(12.47, 49.20, (43.3, 40.2, 44.4), 187.0),
-        "upper_arm": Row(2.55, 57.54, (27.8, 26.0, 14.8), 275.1),
-        "forearm": Row(1.38, 45.59, (26.1, 25.7, 9.4), 264.3),
-        "hand": Row(0.56, 74.74, (53.1, 45.4, 33.5), 78.0),
-        "thigh": Row(14.78, 38.0, (35.0, 34.5, 15.6), 390.0),
-        "shank": Row(4.81, 43.52, (26.7, 26.3, 9.2), 438.6),
-        "foot": Row(1.29, 40.14, (29.9, 27.9, 13.9), 228.3),
-    },
+    sex: {row["segment"]: _row(row) for row in rows_of("de_leva.csv") if row["sex"] == sex}
+    for sex in STATURE_M
 }
 # Of a person of the table's stature [m].
 _ANKLE_HEIGHT = 0.073
@@ -80,19 +71,19 @@ _SPINE, _BELOW, _WAIST_M = 0.33, 0.13, 0.11  # way to the neck, part of the tors
 _NECK_AHEAD = -0.012
 _HEAD_AHEAD = 0.018
 # Standard deviations of people about the table [m], [rad] and of logarithms.
-_COM_SD_M = {
-    "pelvis": 0.011,
-    "torso": 0.012,
-    "head": 0.008,
-    "upper_arm": 0.006,
-    "forearm": 0.005,
-    "hand": 0.003,
-    "thigh": 0.010,
-    "shank": 0.007,
-    "foot": 0.004,
-}
+_COM_SD_M = {row["kind"]: float(row["com_sd_m"]) for row in rows_of("people.csv")}
 _LENGTH_SD, _MASS_SD, _MASS_SIDE_SD, _INERTIA_SD, _INERTIA_SIDE_SD = 0.02, 0.09, 0.03, 0.13, 0.04
 _INERTIA_TURN_RAD = 0.08
+
+
+@dataclass
+class Part:
+    """mass : kg, percent of the body's before that is known. com_m (3,). inertia (3, 3) : for that
+    mass, about the centre of mass."""
+
+    mass: float
+    com_m: np.ndarray
+    inertia: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -103,8 +94,7 @@ class Body:
     (``lumbar``, ``neck``, ``hip_r``, ``shoulder_r``, ...) in the frame of the segment above it
     (hips, lumbar: pelvis; spine, neck, shoulders: torso). The abdomen, from lumbar to spine, is the
     part of the torso that may turn less; its frame is the torso's while the spine is straight.
-    masses_kg, coms_m (3,), inertias_kgm2 (3, 3)
-    about the centre of mass: by segment, in its frame.
+    parts : by segment, in its frame.
     """
 
     sex: str
@@ -113,9 +103,7 @@ class Body:
     scale: float
     lengths_m: dict[str, float]
     joints_m: dict[str, np.ndarray]
-    masses_kg: dict[str, float]
-    coms_m: dict[str, np.ndarray]
-    inertias_kgm2: dict[str, np.ndarray]
+    parts: dict[str, Part]
 
     @property
     def ankle_height_m(self) -> float:
@@ -150,14 +138,14 @@ def draw_body(sex: str, mass_kg: float, height_m: float, rng: np.random.Generato
         for name, row in table.items()
     }
     joints = _joints(sex, height_m, scale, lengths, rng)
-    masses, coms, inertias = _inertial_parameters(sex, scale, lengths, joints)
-    _vary(masses, coms, inertias, rng)
-    factor = mass_kg / sum(masses.values())
-    for segment in SEGMENTS:
-        masses[segment] *= factor
-        inertias[segment] *= factor
-    _split_torso(joints, masses, coms, inertias)
-    return Body(sex, mass_kg, height_m, scale, lengths, joints, masses, coms, inertias)
+    parts = _inertial_parameters(table, scale, lengths, joints)
+    _vary(parts, rng)
+    factor = mass_kg / sum(part.mass for part in parts.values())
+    for part in parts.values():
+        part.mass *= factor
+        part.inertia *= factor
+    _split_torso(joints, parts)
+    return Body(sex, mass_kg, height_m, scale, lengths, joints, parts)
 
 
 def suprasternale_m(lengths_m: dict[str, float]) -> float:
@@ -188,21 +176,15 @@ def _joints(
     return joints
 
 
-Parameters = tuple[dict[str, float], dict[str, np.ndarray], dict[str, np.ndarray]]
-
-
 def _inertial_parameters(
-    sex: str, scale: float, lengths: dict[str, float], joints: dict[str, np.ndarray]
-) -> Parameters:
+    table: dict[str, Row], scale: float, lengths: dict[str, float], joints: dict[str, np.ndarray]
+) -> dict[str, Part]:
     """The table's masses [percent], centres of mass and inertias, per segment."""
-    table = TABLE[sex]
-    masses: dict[str, float] = {}
-    coms: dict[str, np.ndarray] = {}
-    inertias: dict[str, np.ndarray] = {}
+    parts: dict[str, Part] = {}
 
     def put(segment: str, row: str, com: Sequence[float], order: Sequence[int] = (0, 1, 2)) -> None:
-        masses[segment], coms[segment] = table[row].mass, np.array(com, float)
-        inertias[segment] = _inertia(table[row], lengths[row], order)
+        inertia = _inertia(table[row], lengths[row], order)
+        parts[segment] = Part(table[row].mass, np.array(com, float), inertia)
 
     lumbar = joints["lumbar"]
     pelvis_up = lengths["lower_trunk"] * (1.0 - table["lower_trunk"].com / 100.0)
@@ -214,8 +196,7 @@ def _inertial_parameters(
             put(f"{limb}_{side}", limb, [0.0, 0.0, -lengths[limb] * table[limb].com / 100.0])
         ahead = -0.06 * scale + lengths["foot"] * table["foot"].com / 100.0
         put(f"foot_{side}", "foot", [ahead, 0.0, -0.038 * scale], order=(2, 1, 0))
-    masses["torso"], coms["torso"], inertias["torso"] = _torso(table, lengths, joints)
-    return masses, coms, inertias
+    return parts | {"torso": _torso(table, lengths, joints)}
 
 
 def _inertia(row: Row, length_m: float, order: Sequence[int] = (0, 1, 2)) -> np.ndarray:
@@ -224,72 +205,54 @@ def _inertia(row: Row, length_m: float, order: Sequence[int] = (0, 1, 2)) -> np.
     return row.mass * np.diag(radii**2)
 
 
-def _torso(
-    table: dict[str, Row], lengths: dict[str, float], joints: dict[str, np.ndarray]
-) -> tuple[float, np.ndarray, np.ndarray]:
+def _torso(table: dict[str, Row], lengths: dict[str, float], joints: dict[str, np.ndarray]) -> Part:
     """Upper and middle trunk as one, both on the line from the lumbar joint to the neck."""
     line = joints["neck"] / joints["neck"][2]  # ahead and up per metre up
-    top = suprasternale_m(lengths)
-    bottom = joints["lumbar"][2]
-    parts = []
+    top, bottom, both = suprasternale_m(lengths), joints["lumbar"][2], []
     for name in ("upper_trunk", "middle_trunk"):
         above_hips = top - lengths[name] * table[name].com / 100.0
-        parts.append((table[name], lengths[name], line * (above_hips - bottom)))
+        both.append((table[name], lengths[name], line * (above_hips - bottom)))
         top -= lengths[name]
-    mass = sum(row.mass for row, _, _ in parts)
-    com = sum(row.mass * place for row, _, place in parts) / mass
+    mass = sum(row.mass for row, _, _ in both)
+    com = sum(row.mass * place for row, _, place in both) / mass
     inertia = np.zeros((3, 3))
-    for row, length, place in parts:
+    for row, length, place in both:
         d = place - com
         inertia += _inertia(row, length) + row.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return mass, com, inertia
+    return Part(mass, com, inertia)
 
 
-def _split_torso(
-    joints: dict[str, np.ndarray],
-    masses: dict[str, float],
-    coms: dict[str, np.ndarray],
-    inertias: dict[str, np.ndarray],
-) -> None:
+def _split_torso(joints: dict[str, np.ndarray], parts: dict[str, Part]) -> None:
     """The abdomen, a cylinder, and what it leaves of the torso, in place."""
     joints["spine"] = _SPINE * joints["neck"]
-    whole, mass = coms["torso"], masses["torso"]
-    below, low = _BELOW * mass, 0.5 * joints["spine"]
-    high = (mass * whole - below * low) / (mass - below)
+    whole = parts["torso"]
+    below, low = _BELOW * whole.mass, 0.5 * joints["spine"]
+    high = (whole.mass * whole.com_m - below * low) / (whole.mass - below)
     long = np.linalg.norm(joints["spine"])
     across = below * (3.0 * _WAIST_M**2 + long**2) / 12.0
     own = np.diag([across, across, 0.5 * below * _WAIST_M**2])
-    apart = low - high
-    pair = below * (mass - below) / mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
-    masses["abdomen"], coms["abdomen"], inertias["abdomen"] = below, low, own
-    masses["torso"], coms["torso"] = mass - below, high
-    inertias["torso"] = inertias["torso"] - own - pair
+    apart, shared = low - high, below * (whole.mass - below) / whole.mass
+    pair = shared * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    parts["abdomen"] = Part(below, low, own)
+    parts["torso"] = Part(whole.mass - below, high, whole.inertia - own - pair)
 
 
-def _vary(
-    masses: dict[str, float],
-    coms: dict[str, np.ndarray],
-    inertias: dict[str, np.ndarray],
-    rng: np.random.Generator,
-) -> None:
+def _vary(parts: dict[str, Part], rng: np.random.Generator) -> None:
     """Take a person off the table, in place."""
     common: dict[str, tuple[float, np.ndarray, np.ndarray]] = {}
     for segment in SEGMENTS:
-        kind = kind_of(segment)
+        part, kind = parts[segment], kind_of(segment)
         if kind not in common:
-            common[kind] = (
-                rng.normal(0.0, _MASS_SD),
-                rng.normal(0.0, 1.0, 3),
-                rng.normal(0.0, _INERTIA_SD, 3),
-            )
+            heavier, off = rng.normal(0.0, _MASS_SD), rng.normal(0.0, 1.0, 3)
+            common[kind] = heavier, off, rng.normal(0.0, _INERTIA_SD, 3)
         heavier, off, larger = common[kind]
         paired = segment != kind
         if paired:
             heavier += rng.normal(0.0, _MASS_SIDE_SD)
-        masses[segment] *= np.exp(heavier)
+        part.mass *= np.exp(heavier)
         mirrored = 0.3 if not paired else (-1.0 if segment.endswith("_l") else 1.0)
         own = 0.35 * rng.normal(0.0, 1.0, 3) * [1.0, 1.0 if paired else 0.3, 1.0]
-        coms[segment] = coms[segment] + _COM_SD_M[kind] * (0.9 * off * [1.0, mirrored, 1.0] + own)
+        part.com_m = part.com_m + _COM_SD_M[kind] * (0.9 * off * [1.0, mirrored, 1.0] + own)
         stretch = np.exp((larger + rng.normal(0.0, _INERTIA_SIDE_SD, 3)) / 2.0)
         Q = Rotation.from_rotvec(rng.normal(0.0, _INERTIA_TURN_RAD, 3)).as_matrix()
-        inertias[segment] = Q @ (inertias[segment] * np.outer(stretch, stretch)) @ Q.T
+        part.inertia = Q @ (part.inertia * np.outer(stretch, stretch)) @ Q.T

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
@@ -10,17 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import butter, lsim, lti, sosfilt
 
-from tests.blind.second_world.balance import GRAVITY, Load, rate_of
+from tests.blind.second_world.balance import GRAVITY, Load, OnGround, rate_of
 from tests.blind.second_world.body import SIDES
 from tests.blind.second_world.motion import Motion
 from tests.blind.second_world.smooth import window
 
-HAND_M = np.array([0.02, 0.0, -0.07])  # where a hand holds something, in its frame
-WAIST_M = np.array([-0.1, 0.0, 0.05])  # where a tether pulls, in the pelvis' frame
+HAND_M = (0.02, 0.0, -0.07)  # where a hand holds something, in its frame
+WAIST_M = (-0.1, 0.0, 0.05)  # where a tether pulls, in the pelvis' frame
 _WOBBLE_HZ, _WOBBLE_DAMPING = 4.0, 0.2
 _CHANGES_AT = 0.45  # of a trial, where something happens within it
 _CONTACT = (3.0, 5.5, 0.5)  # start, length and ramp [s] of a hand's touch
 _STILL = (2.0, 7.5, 0.9)  # of the arm about it
+_UP = (0.0, 0.0, 1.0)
 FZ = 2  # column of a plate's wrench
 
 
@@ -82,57 +83,41 @@ class Changes:
         )
 
 
-@dataclass(frozen=True)
-class Mass:
+# --- what the ground has to carry besides the body ------------------------------------------------
+
+
+def mass(mass_kg: float, until_s: float = np.inf) -> OnGround:
     """A point mass that is carried, until a time if one is told."""
-
-    segment: str
-    place_m: np.ndarray
-    mass_kg: float
-    until_s: float = np.inf
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        carried = self.mass_kg * (times_s < self.until_s)
-        return (rate_of(velocity, times_s) + GRAVITY) * carried[:, None]
+    return lambda times_s, velocity: (
+        (rate_of(velocity, times_s) + GRAVITY) * (mass_kg * (times_s < until_s))[:, None]
+    )
 
 
-@dataclass(frozen=True)
-class Touch:
+def touch(force_n: float) -> OnGround:
     """A hand leans on something that lifts it by force_n: the ground carries less."""
-
-    segment: str
-    place_m: np.ndarray
-    force_n: float
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        return np.outer(-self.force_n * window(times_s, *_CONTACT), [0.0, 0.0, 1.0])
+    return lambda times_s, velocity: np.outer(
+        -force_n * window(times_s, *_CONTACT), [0.0, 0.0, 1.0]
+    )
 
 
-@dataclass(frozen=True)
-class Tether:
-    """A damped rope, less so up and down; damping_ns_m : force per speed [N s/m]."""
-
-    segment: str
-    place_m: np.ndarray
-    damping_ns_m: float
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        return self.damping_ns_m * velocity * [1.0, 1.0, 0.3]
+def tether(damping_ns_m: float) -> OnGround:
+    """A damped rope, less so up and down; force per speed [N s/m]."""
+    return lambda times_s, velocity: damping_ns_m * velocity * [1.0, 1.0, 0.3]
 
 
-@dataclass(frozen=True)
-class Wobble:
+def wobble(mass_kg: float) -> OnGround:
     """A part of the body that swings up and down on it, by itself at 4 Hz and soon still again."""
+    pace = 2.0 * np.pi * _WOBBLE_HZ
+    swing = lti([-1.0, 0.0, 0.0], [1.0, 2.0 * _WOBBLE_DAMPING * pace, pace**2])
 
-    segment: str
-    place_m: np.ndarray
-    mass_kg: float
-
-    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        pace = 2.0 * np.pi * _WOBBLE_HZ
-        swing = lti([-1.0, 0.0, 0.0], [1.0, 2.0 * _WOBBLE_DAMPING * pace, pace**2])
+    def on_ground(times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         _, beyond, _ = lsim(swing, rate_of(velocity[:, 2], times_s), times_s)
-        return np.outer(self.mass_kg * beyond, [0.0, 0.0, 1.0])
+        return np.outer(mass_kg * beyond, _UP)
+
+    return on_ground
+
+
+# --- what is hidden in a trial --------------------------------------------------------------------
 
 
 def changes_of(hidden: Hidden, motion: Motion) -> Changes:
@@ -142,22 +127,13 @@ def changes_of(hidden: Hidden, motion: Motion) -> Changes:
     return _OTHERS[hidden.effect](hidden, motion)
 
 
-def _marker(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(moved={hidden.target: lambda t: np.tile(hidden.size, (len(t), 1))})
+def _carried(segment: str, place_m: Sequence[float], on_ground: OnGround) -> Changes:
+    return Changes(loads=(Load(segment, np.array(place_m), on_ground),))
 
 
 def _slip(hidden: Hidden, motion: Motion) -> Changes:
     since_s = _middle_s(motion)
     return Changes(moved={hidden.target: lambda t: np.outer(t > since_s, hidden.size)})
-
-
-def _worn(hidden: Hidden, motion: Motion) -> Changes:
-    segment, place = hidden.target
-    return Changes(loads=(Mass(segment, np.array(place), hidden.size),))
-
-
-def _dropped(hidden: Hidden, motion: Motion) -> Changes:
-    return Changes(loads=(Mass(hidden.target, HAND_M, hidden.size, _middle_s(motion)),))
 
 
 def _touch(hidden: Hidden, motion: Motion) -> Changes:
@@ -167,7 +143,7 @@ def _touch(hidden: Hidden, motion: Motion) -> Changes:
         course = motion.q[f"{name}_{side}"]
         motion.q[f"{name}_{side}"] = course + 0.95 * still * (course[0] - course)
     motion.add(f"elbow_{side}", 0.9 * still)
-    return Changes(loads=(Touch(hidden.target, HAND_M, hidden.size),))
+    return _carried(hidden.target, HAND_M, touch(hidden.size))
 
 
 def _bend(hidden: Hidden, motion: Motion) -> Changes:
@@ -177,6 +153,9 @@ def _bend(hidden: Hidden, motion: Motion) -> Changes:
 
 def _middle_s(motion: Motion) -> float:
     return _CHANGES_AT * len(motion.t) / motion.rate_hz
+
+
+# --- on a plate's channels ------------------------------------------------------------------------
 
 
 def _gain(hidden: Hidden, seen: Signals) -> np.ndarray:
@@ -234,14 +213,16 @@ _OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
     "clock": lambda hidden, motion: Changes(fast=1e-6 * hidden.size),
     "shift": lambda hidden, motion: Changes(shift_m=hidden.size),
     "yaw": lambda hidden, motion: Changes(yaw_rad=np.radians(hidden.size)),
-    "marker": _marker,
-    "slip": _slip,
-    "worn": _worn,
-    "dropped": _dropped,
-    "touch": _touch,
-    "wobble": lambda hidden, motion: Changes(
-        loads=(Wobble(hidden.target, np.zeros(3), hidden.size),)
+    "marker": lambda hidden, motion: Changes(
+        moved={hidden.target: lambda t: np.tile(hidden.size, (len(t), 1))}
     ),
+    "slip": _slip,
+    "worn": lambda hidden, motion: _carried(*hidden.target, mass(hidden.size)),
+    "dropped": lambda hidden, motion: _carried(
+        hidden.target, HAND_M, mass(hidden.size, _middle_s(motion))
+    ),
+    "touch": _touch,
+    "wobble": lambda hidden, motion: _carried(hidden.target, (0.0, 0.0, 0.0), wobble(hidden.size)),
     "bend": _bend,
-    "tether": lambda hidden, motion: Changes(loads=(Tether("pelvis", WAIST_M, hidden.size),)),
+    "tether": lambda hidden, motion: _carried("pelvis", WAIST_M, tether(hidden.size)),
 }

@@ -85,28 +85,26 @@ class Recorded:
     corners_m: tuple[np.ndarray, ...]
 
 
+@dataclass(frozen=True)
+class Equipment:
+    """plate_type : 2, 3 or 4, as C3D numbers them; two_plates : one for each foot."""
+
+    marker_set: str
+    rate_hz: int
+    plate_type: int
+    two_plates: bool
+
+
 class Lab:
-    """rate_hz, analog_hz : of markers and plates. plate_type : 2, 3 or 4, as C3D numbers them.
+    """Equipment with its errors. delay_s : of the plates behind the cameras."""
 
-    two_plates : one for each foot. delay_s : of the plates behind the cameras.
-    """
-
-    def __init__(
-        self,
-        marker_set: str,
-        rate_hz: int,
-        analog_hz: int,
-        plate_type: int,
-        two_plates: bool,
-        rng: np.random.Generator,
-    ) -> None:
-        self.labels = MARKER_SETS[marker_set]
-        self.rate_hz, self.analog_hz, self.plate_type = rate_hz, analog_hz, plate_type
-        self.two_plates = two_plates
+    def __init__(self, equipment: Equipment, rng: np.random.Generator) -> None:
+        self.labels, self.equipment = MARKER_SETS[equipment.marker_set], equipment
+        self.rate_hz, self.analog_hz = equipment.rate_hz, 10 * equipment.rate_hz
         self.feet_m = np.array([rng.uniform(0.2, 1.0), rng.uniform(0.2, 1.0), 0.0])
         places = [((0.10, -0.262), (0.250, 0.300)), ((0.10, 0.262), (0.250, 0.300))]
         one = [((0.05, 0.0), (0.45, 0.45))]
-        self.plates = tuple(Plate.drawn(*p, rng) for p in (places if two_plates else one))
+        self.plates = tuple(Plate.drawn(*p, rng) for p in (places if equipment.two_plates else one))
         self.delay_s, self.noise_m = rng.uniform(0.0, 0.0008), rng.uniform(0.0002, 0.0006)
 
     def in_words(self) -> str:
@@ -148,7 +146,7 @@ class Lab:
 
     def _on_plates(self, found: Balanced) -> list[tuple[np.ndarray, np.ndarray]]:
         """Force and moment about the feet's middle, per plate."""
-        if not self.two_plates:
+        if not self.equipment.two_plates:
             return [(found.force_n, found.moment_nm)]
         feet = by_foot(found)
         return [feet["r"], feet["l"]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class Block:
     def __init__(self, motion: Motion, start_s: float, length_s: float) -> None:
         self.motion, self.start_s, self.length_s = motion, start_s, length_s
         self.within = window(motion.t, start_s, length_s, 0.7)
-        self.draw = motion.rng.uniform
+        self.draw, self.add, self.add_both = motion.rng.uniform, motion.add, motion.add_both
         self.pace_hz, self.phase_rad = self.draw(0.35, 0.6), self.draw(0.0, 2.0 * np.pi)
 
     def wave(self, rate_hz: float, phase_rad: float = 0.0) -> np.ndarray:
@@ -36,79 +37,66 @@ class Block:
 
 
 def bow(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    down = draw(0.5, 0.9) * block.rise(draw(0.3, 0.45))
-    add("trunk_pitch", 0.7 * down)
-    add("pelvis_pitch", 0.5 * down)
-    add("neck_pitch", -0.3 * down * draw(0.0, 1.0))
+    down = block.draw(0.5, 0.9) * block.rise(block.draw(0.3, 0.45))
+    block.add("trunk_pitch", 0.7 * down)
+    block.add("pelvis_pitch", 0.5 * down)
+    block.add("neck_pitch", -0.3 * down * block.draw(0.0, 1.0))
     for side in SIDES:
-        add(f"flexion_{side}", down * draw(0.3, 0.9))
+        block.add(f"flexion_{side}", down * block.draw(0.3, 0.9))
 
 
 def lean_sideways(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    over = block.wave(draw(0.3, 0.5))
-    add("trunk_roll", draw(0.3, 0.45) * over)
-    add("pelvis_roll", 0.12 * over * draw(0.3, 1.0))
-    add("neck_roll", 0.2 * over)
+    over = block.wave(block.draw(0.3, 0.5))
+    block.add("trunk_roll", block.draw(0.3, 0.45) * over)
+    block.add("pelvis_roll", 0.12 * over * block.draw(0.3, 1.0))
+    block.add("neck_roll", 0.2 * over)
     for side in SIDES:
-        add(f"abduction_{side}", 0.5 * block.within * draw(0.5, 1.5))
+        block.add(f"abduction_{side}", 0.5 * block.within * block.draw(0.5, 1.5))
 
 
 def twist(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    turn = block.wave(draw(0.4, 0.7))
-    add("trunk_yaw", draw(0.35, 0.55) * turn)
-    add("pelvis_yaw", 0.25 * turn)
-    add("neck_yaw", -0.3 * turn * draw(-1.0, 1.0))
-    apart = draw(0.8, 1.4)
+    turn = block.wave(block.draw(0.4, 0.7))
+    block.add("trunk_yaw", block.draw(0.35, 0.55) * turn)
+    block.add("pelvis_yaw", 0.25 * turn)
+    block.add("neck_yaw", -0.3 * turn * block.draw(-1.0, 1.0))
+    apart = block.draw(0.8, 1.4)
     for side in SIDES:
-        add(f"abduction_{side}", apart * block.within)
-        add(f"elbow_{side}", draw(0.0, 0.8) * block.within)
+        block.add(f"abduction_{side}", apart * block.within)
+        block.add(f"elbow_{side}", block.draw(0.0, 0.8) * block.within)
 
 
 def swing_arms(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    swing = draw(0.5, 1.0) * block.wave(draw(0.6, 1.0))
+    swing = block.draw(0.5, 1.0) * block.wave(block.draw(0.6, 1.0))
     together = block.motion.rng.choice([-1, 1])
-    add("flexion_r", swing + 0.3 * block.within)
-    add("flexion_l", together * swing + 0.3 * block.within)
-    add("elbow_r", 0.4 * block.rise(0.7))
-    add("elbow_l", 0.4 * block.rise(0.8))
+    block.add("flexion_r", swing + 0.3 * block.within)
+    block.add("flexion_l", together * swing + 0.3 * block.within)
+    block.add("elbow_r", 0.4 * block.rise(0.7))
+    block.add("elbow_l", 0.4 * block.rise(0.8))
 
 
 def circle_arms(block: Block) -> None:
     rate, wide = block.draw(0.5, 0.8), block.draw(0.6, 0.9)
     direction = block.motion.rng.choice([-1, 1])
-    block.motion.add_both("flexion", wide * block.wave(rate) + 0.9 * block.within)
+    block.add_both("flexion", wide * block.wave(rate) + 0.9 * block.within)
     sideways = 0.7 * wide * block.wave(rate, direction * np.pi / 2.0)
-    block.motion.add_both("abduction", sideways + 0.5 * block.within)
+    block.add_both("abduction", sideways + 0.5 * block.within)
 
 
 def raise_arms(block: Block) -> None:
     rate, high = block.draw(0.35, 0.55), block.draw(1.2, 1.9)
-    block.motion.add_both("abduction", high * block.rise(rate))
-    block.motion.add_both("rotation", 0.4 * block.wave(rate))
-    block.motion.add_both("pronation", -0.5 * block.rise(rate))
+    block.add_both("abduction", high * block.rise(rate))
+    block.add_both("rotation", 0.4 * block.wave(rate))
+    block.add_both("pronation", -0.5 * block.rise(rate))
 
 
 def squat(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    rate, deep = draw(0.35, 0.55), draw(0.15, 0.30)
+    rate, deep = block.draw(0.35, 0.55), block.draw(0.15, 0.30)
     down = block.rise(rate)
-    add("up", -deep * down)
-    add("trunk_pitch", 1.25 * deep * down)
-    add("pelvis_pitch", 1.1 * deep * down)
-    add("neck_pitch", -0.25 * down)
-    block.motion.add_both("flexion", draw(0.5, 1.4) * down)
-
-
-def swing_right_leg(block: Block) -> None:
-    _swing_leg(block, "r")
-
-
-def swing_left_leg(block: Block) -> None:
-    _swing_leg(block, "l")
+    block.add("up", -deep * down)
+    block.add("trunk_pitch", 1.25 * deep * down)
+    block.add("pelvis_pitch", 1.1 * deep * down)
+    block.add("neck_pitch", -0.25 * down)
+    block.add_both("flexion", block.draw(0.5, 1.4) * down)
 
 
 def _swing_leg(block: Block, side: str) -> None:
@@ -140,67 +128,68 @@ def _swing_leg(block: Block, side: str) -> None:
 
 
 def shift_weight(block: Block) -> None:
-    motion, draw = block.motion, block.draw
-    forth = block.wave(draw(0.2, 0.3)) * draw(0.03, 0.05) * motion.body.scale
+    motion = block.motion
+    forth = block.wave(block.draw(0.2, 0.3)) * block.draw(0.03, 0.05) * motion.body.scale
     motion.ahead_m = motion.ahead_m + forth
-    across = block.wave(draw(0.25, 0.4), block.phase_rad)
+    across = block.wave(block.draw(0.25, 0.4), block.phase_rad)
     motion.weight_right = motion.weight_right + 0.22 * across
     motion.add("pelvis_yaw", 0.06 * across)
 
 
 def head_and_hands(block: Block) -> None:
-    add, draw = block.motion.add, block.draw
-    add("neck_yaw", draw(0.4, 0.7) * block.wave(draw(0.4, 0.7)))
-    add("neck_pitch", draw(0.2, 0.4) * block.wave(draw(0.3, 0.6), block.phase_rad))
-    add("neck_roll", 0.25 * block.wave(0.4, 1.0))
+    block.add("neck_yaw", block.draw(0.4, 0.7) * block.wave(block.draw(0.4, 0.7)))
+    block.add(
+        "neck_pitch", block.draw(0.2, 0.4) * block.wave(block.draw(0.3, 0.6), block.phase_rad)
+    )
+    block.add("neck_roll", 0.25 * block.wave(0.4, 1.0))
     for side in SIDES:
-        add(f"elbow_{side}", draw(0.8, 1.5) * block.rise(draw(0.6, 1.0)))
-        add(f"pronation_{side}", 0.6 * block.wave(draw(0.5, 0.9)))
-        add(f"wrist_{side}", 0.5 * block.wave(draw(0.7, 1.1)))
-        add(f"wrist_side_{side}", 0.2 * block.wave(0.6))
+        block.add(f"elbow_{side}", block.draw(0.8, 1.5) * block.rise(block.draw(0.6, 1.0)))
+        block.add(f"pronation_{side}", 0.6 * block.wave(block.draw(0.5, 0.9)))
+        block.add(f"wrist_{side}", 0.5 * block.wave(block.draw(0.7, 1.1)))
+        block.add(f"wrist_side_{side}", 0.2 * block.wave(0.6))
 
 
 def all_together(block: Block) -> None:
-    add, rate = block.motion.add, block.draw(0.35, 0.5)
+    rate = block.draw(0.35, 0.5)
     down, turn = block.rise(rate), block.wave(0.5 * rate + 0.1, block.phase_rad)
-    add("up", -block.draw(0.08, 0.2) * down)
-    add("trunk_yaw", 0.4 * turn)
-    add("pelvis_yaw", 0.15 * turn)
-    add("trunk_pitch", 0.3 * down)
-    add("pelvis_pitch", 0.15 * down)
-    add("trunk_roll", 0.15 * block.wave(0.8 * rate, 1.0))
+    block.add("up", -block.draw(0.08, 0.2) * down)
+    block.add("trunk_yaw", 0.4 * turn)
+    block.add("pelvis_yaw", 0.15 * turn)
+    block.add("trunk_pitch", 0.3 * down)
+    block.add("pelvis_pitch", 0.15 * down)
+    block.add("trunk_roll", 0.15 * block.wave(0.8 * rate, 1.0))
     swing = 0.8 * block.wave(1.3 * rate)
-    add("flexion_r", 0.6 * block.within + swing)
-    add("flexion_l", 0.6 * block.within - swing)
-    add("abduction_r", 0.5 * block.rise(0.9 * rate))
-    add("abduction_l", 0.4 * block.rise(1.1 * rate))
-    add("elbow_r", 0.8 * down)
-    add("elbow_l", 0.7 * block.rise(1.2 * rate))
+    block.add("flexion_r", 0.6 * block.within + swing)
+    block.add("flexion_l", 0.6 * block.within - swing)
+    block.add("abduction_r", 0.5 * block.rise(0.9 * rate))
+    block.add("abduction_l", 0.4 * block.rise(1.1 * rate))
+    block.add("elbow_r", 0.8 * down)
+    block.add("elbow_l", 0.7 * block.rise(1.2 * rate))
     block.motion.weight_right = block.motion.weight_right + 0.1 * turn
 
 
 def punch(block: Block) -> None:
-    add, rate = block.motion.add, 1.6 * block.pace_hz
+    rate = 1.6 * block.pace_hz
     for side, forth in (("r", block.rise(rate)), ("l", block.within - block.rise(rate))):
-        add(f"flexion_{side}", 1.2 * forth + 0.1 * block.within)
-        add(f"elbow_{side}", 1.4 * (block.within - forth))
-        add(f"rotation_{side}", 0.2 * block.within)
-    add("trunk_yaw", 0.2 * block.wave(rate))
-    add("pelvis_pitch", 0.05 * block.within)
+        block.add(f"flexion_{side}", 1.2 * forth + 0.1 * block.within)
+        block.add(f"elbow_{side}", 1.4 * (block.within - forth))
+        block.add(f"rotation_{side}", 0.2 * block.within)
+    block.add("trunk_yaw", 0.2 * block.wave(rate))
+    block.add("pelvis_pitch", 0.05 * block.within)
 
 
 def circle_pelvis(block: Block) -> None:
-    add, rate = block.motion.add, block.draw(0.4, 0.6)
+    rate = block.draw(0.4, 0.6)
     roll, pitch = block.wave(rate, block.phase_rad), block.wave(0.8 * rate, 1.3)
-    add("pelvis_yaw", 0.15 * block.wave(0.7 * rate))
-    add("pelvis_roll", 0.10 * roll)
-    add("pelvis_pitch", 0.15 * pitch)
-    add("trunk_pitch", -0.12 * pitch)
-    add("trunk_roll", -0.08 * roll)
-    add("up", -0.05 * block.rise(rate))
+    block.add("pelvis_yaw", 0.15 * block.wave(0.7 * rate))
+    block.add("pelvis_roll", 0.10 * roll)
+    block.add("pelvis_pitch", 0.15 * pitch)
+    block.add("trunk_pitch", -0.12 * pitch)
+    block.add("trunk_roll", -0.08 * roll)
+    block.add("up", -0.05 * block.rise(rate))
 
 
-_LEGS = (swing_right_leg, swing_left_leg)
+_LEGS = tuple(partial(_swing_leg, side=side) for side in SIDES)
 _ONCE = (
     *(bow, lean_sideways, twist, swing_arms, circle_arms, raise_arms, squat, *_LEGS),
     *(shift_weight, head_and_hands, all_together, punch, circle_pelvis, *_LEGS),

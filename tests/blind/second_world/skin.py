@@ -10,23 +10,13 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from tests.blind.second_world.balance import rate_of
-from tests.blind.second_world.body import LIMBS, SEGMENTS, SIDES, kind_of
+from tests.blind.second_world.body import LIMBS, SEGMENTS, SIDES, kind_of, rows_of
 from tests.blind.second_world.kinematics import Poses
 from tests.blind.second_world.landmarks import Landmark
 from tests.blind.second_world.smooth import slow_course
 
 # Shift of all markers of a segment per turn of a joint beside it [m/rad].
-_PER_RAD = {
-    "pelvis": 0.004,
-    "torso": 0.003,
-    "head": 0.0012,
-    "upper_arm": 0.005,
-    "forearm": 0.004,
-    "hand": 0.002,
-    "thigh": 0.008,
-    "shank": 0.0045,
-    "foot": 0.0012,
-}
+_PER_RAD = {row["kind"]: float(row["skin_m_per_rad"]) for row in rows_of("people.csv")}
 _TURN_PER_RAD = np.radians(1.2)  # of all markers of a segment together, as far as its joints turn
 _TURNS = np.array([[0.6], [0.6], [1.4]])  # about x, y and most about the long axis
 _OWN = 0.45  # of a single marker, over the shift of all

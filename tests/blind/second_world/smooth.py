@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 _BEFORE_S = 2.0  # drawn before and after a course, so that its ends are like its middle
 
 
-def about_x(angles_rad: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N, 3, 3) about the x axis."""
-    return _about(0, angles_rad)
-
-
-def about_y(angles_rad: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N, 3, 3) about the y axis."""
-    return _about(1, angles_rad)
-
-
-def about_z(angles_rad: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N, 3, 3) about the z axis."""
-    return _about(2, angles_rad)
-
-
 def _about(axis: int, angles_rad: np.ndarray) -> np.ndarray:
+    """Rotation matrices (N, 3, 3) about an axis."""
     angles = np.atleast_1d(angles_rad)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     R = np.zeros((len(angles), 3, 3))
@@ -32,6 +20,9 @@ def _about(axis: int, angles_rad: np.ndarray) -> np.ndarray:
     R[:, second, first] = np.sin(angles)
     R[:, first, second] = -np.sin(angles)
     return R
+
+
+about_x, about_y, about_z = (partial(_about, axis) for axis in range(3))
 
 
 def turned(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:

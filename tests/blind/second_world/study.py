@@ -38,31 +38,18 @@ def write_study(folder: Path, case: Case) -> None:
         run = "" if task == "static" else "_run-1"
         path = folder / PERSON / f"{PERSON}_task-{task}{run}.c3d"
         write_c3d(path, lab.record(found, skin, changes, rng), equipment.plate_type)
-    weighed_kg = case.somebody.mass_kg + rng.normal(0.0, _SCALES_SD_KG)
-    _write_participants(folder, case, weighed_kg)  # last: with it, a study is complete
+    who = case.somebody
+    weighed_kg = who.mass_kg + rng.normal(0.0, _SCALES_SD_KG)
+    line = f"{PERSON}\t{who.sex}\t{weighed_kg:.1f}\t{who.height_m:.2f}"
+    table = f"participant_id\tsex\tmass_kg\theight_m\n{line}\n"
+    # last: with it, a study is complete
+    (folder / "participants.tsv").write_text(table, encoding="utf-8")
 
 
 def drawn(case: Case) -> tuple[Body, dict[str, Landmark], Lab, np.random.Generator]:
     """A case's person and lab, and the generator that goes on from there."""
-    somebody, equipment = case.somebody, case.equipment
+    somebody = case.somebody
     rng = np.random.default_rng(somebody.seed)
     body = draw_body(somebody.sex, somebody.mass_kg, somebody.height_m, rng)
     landmarks = place_landmarks(body, rng)
-    lab = Lab(
-        equipment.marker_set,
-        equipment.rate_hz,
-        10 * equipment.rate_hz,
-        equipment.plate_type,
-        equipment.two_plates,
-        rng,
-    )
-    return body, landmarks, lab, rng
-
-
-def _write_participants(folder: Path, case: Case, weighed_kg: float) -> None:
-    who = case.somebody
-    lines = (
-        "participant_id\tsex\tmass_kg\theight_m",
-        f"{PERSON}\t{who.sex}\t{weighed_kg:.1f}\t{who.height_m:.2f}",
-    )
-    (folder / "participants.tsv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return body, landmarks, Lab(case.equipment, rng), rng

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from bsip_cli.simulate.numerics import glide, slow_drift, soft_polyline, step, window
-from bsip_cli.simulate.people import SIDES, Person
+from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person, table
 from bsip_cli.simulate.plan import (
     FootSketch,
     Plan,
@@ -25,22 +26,24 @@ from bsip_cli.simulate.plan import (
 RIGHT_HANDED_SHARE = 0.9
 SOFTNESS_S = 0.032
 STAGGER_M = 0.11  # each foot from the middle
-# Of a throw, in degrees at: start, cocked, release, followed through, back.
-SHOULDER_FLEXION = (0.0, 115.0, 45.0, 5.0, 0.0)
-SHOULDER_ABDUCTION = (0.0, 75.0, 78.0, 35.0, 0.0)
-ELBOW = (0.0, 95.0, 12.0, 10.0, 0.0)
-SNAP = (0.0, -30.0, 10.0, 30.0, 0.0)
-FREE_SHOULDER = (0.0, 50.0, 20.0, 0.0, 0.0)
-FREE_ELBOW = (0.0, 15.0, 60.0, 50.0, 0.0)
-TURN = (0.0, -38.0, 16.0, 34.0, 0.0)
-LEAN = (0.0, 8.0, -14.0, -28.0, 0.0)
+# Of a throw, in degrees at: start, cocked, release, followed through, back; and how early [s].
+THROW = (
+    ("shoulder_own 0", (0, 115, 45, 5, 0), 0.0),
+    ("shoulder_own 1", (0, 75, 78, 35, 0), 0.0),
+    ("elbow_own", (0, 95, 12, 10, 0), 0.01),
+    ("wrist_own 0", (0, -30, 10, 30, 0), 0.0),
+    ("shoulder_free 0", (0, 50, 20, 0, 0), 0.0),  # the free arm points ahead, then comes in
+    ("elbow_free", (0, 15, 60, 50, 0), 0.0),
+    ("turn", (0, -38, 16, 34, 0), 0.04),
+    ("waist 0", (0, 8, -14, -28, 0), 0.0),
+)
+TURNED = {"waist 2": 0.7, "pelvis 2": 0.3, "neck 2": -0.7}  # parts of its turn
 
 
 def static(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
     """Upright and nearly still, arms slightly away from the body."""
     sketch = sketch_for(person, duration_s)
-    for side in SIDES:
-        sketch.angles[f"shoulder_{side}"][:, 1] += np.deg2rad(13.0)
+    sketch.bend_both("shoulder_* 1", np.deg2rad(13.0))
     moved_a_little(sketch, rng, 0.15, 0.4)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng))
 
@@ -55,7 +58,7 @@ def squat(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
         down += depth * window(sketch.t_s, start + pause, end, 0.5 * (end - start - pause))
     add_squat(sketch, down, 0.16 * person.stature_m)
     for side in SIDES:
-        sketch.angles[f"shoulder_{side}"][:, 0] += np.deg2rad(rng.uniform(55.0, 75.0)) * down
+        sketch.bend(f"shoulder_{side} 0", np.deg2rad(rng.uniform(55.0, 75.0)) * down)
     moved_a_little(sketch, rng, 0.4)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
 
@@ -65,34 +68,23 @@ def throwing(
 ) -> Plan:
     """Stand with one foot ahead, cock the arm, throw, follow through, stand."""
     sketch = sketch_for(person, duration_s)
-    angles, feet = sketch.angles, sketch.feet
+    t = sketch.t_s
     side, other = ("r", "l") if rng.random() < RIGHT_HANDED_SHARE else ("l", "r")
-    feet[side].ahead_m -= STAGGER_M
-    feet[other].ahead_m += STAGGER_M
+    sketch.feet[side].ahead_m -= STAGGER_M
+    sketch.feet[other].ahead_m += STAGGER_M
     throw_s, release = rng.uniform(0.20, 0.26), 0.5 * duration_s
     frames = np.array([0.15, release - throw_s, release, release + 0.22, duration_s - 0.15])
-
-    def curve(degrees: tuple[float, ...], early_s: float = 0.0) -> np.ndarray:
+    for name, degrees, early_s in THROW:
         size = np.deg2rad(np.array(degrees)) * rng.uniform(0.85, 1.1)
-        return soft_polyline(sketch.t_s, frames - early_s, size, SOFTNESS_S)
-
-    angles[f"shoulder_{side}"][:, 0] += curve(SHOULDER_FLEXION)
-    angles[f"shoulder_{side}"][:, 1] += curve(SHOULDER_ABDUCTION)
-    angles[f"elbow_{side}"] += curve(ELBOW, 0.01)
-    angles[f"wrist_{side}"][:, 0] += curve(SNAP)
-    # the free arm points ahead, then comes in
-    angles[f"shoulder_{other}"][:, 0] += curve(FREE_SHOULDER)
-    angles[f"elbow_{other}"] += curve(FREE_ELBOW)
-    turn = (1.0 if side == "r" else -1.0) * curve(TURN, 0.04)
-    angles["waist"][:, 2] += 0.7 * turn
-    sketch.pelvis_angles[:, 2] += 0.3 * turn
-    angles["waist"][:, 0] += curve(LEAN)
-    angles["neck"][:, 2] -= 0.7 * turn
-    dip = step(sketch.t_s, frames[0], frames[1]) - step(sketch.t_s, frames[3], frames[4])
+        curve = soft_polyline(t, frames - early_s, size, SOFTNESS_S)
+        if name != "turn":
+            sketch.bend(name.replace("own", side).replace("free", other), curve)
+        for turned, part in TURNED.items() if name == "turn" else ():
+            sketch.bend(turned, part * (SIDE_SIGN[side] * curve))
+    dip = step(t, frames[0], frames[1]) - step(t, frames[3], frames[4])
     add_squat(sketch, dip, 0.04 * person.stature_m)
-    for name in SIDES:
-        angles[f"wrist_{name}"][:, 2] -= np.deg2rad(20.0) * dip
-    ahead = soft_polyline(sketch.t_s, frames, np.array([0, -1.0, 0.6, 1.0, 0]), 0.08)
+    sketch.bend_both("wrist_* 2", -np.deg2rad(20.0) * dip)
+    ahead = soft_polyline(t, frames, np.array([0, -1.0, 0.6, 1.0, 0]), 0.08)
     sketch.shift_load(side, 0.25 * ahead)
     moved_a_little(sketch, rng, 0.4, 0.6)
     ball, notes = held_ball(sketch, rng, side, release, ball_mass_kg), {"throwing_side": side}
@@ -103,15 +95,13 @@ def throwing(
 def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
     """A bow, arms ahead and aside, each leg raised with a bent and a straight knee: all held."""
     sketch = sketch_for(person, duration_s)
-    starts = np.linspace(0.0, duration_s, 8)
-    for number, (start, end) in enumerate(pairwise(starts)):
+    for number, (start, end) in enumerate(pairwise(np.linspace(0.0, duration_s, 8))):
         shift = 0.3 * (end - start)
         held = window(sketch.t_s, start, end, shift) * rng.uniform(0.85, 1.0)
         if number == 0:
-            sketch.angles["waist"][:, 0] -= np.deg2rad(35.0) * held
+            sketch.bend("waist 0", -np.deg2rad(35.0) * held)
         elif number < 3:
-            for side in SIDES:
-                sketch.angles[f"shoulder_{side}"][:, number - 1] += np.deg2rad(80.0) * held
+            sketch.bend_both(f"shoulder_* {number - 1}", np.deg2rad(80.0) * held)
         else:  # stand on the other leg for the middle, and hold the foot ahead and up
             side, half = SIDES[number % 2], 0.5 * shift
             sketch.shift_load(side, 0.5 * window(sketch.t_s, start, end, half))
@@ -177,11 +167,8 @@ def stepon(person: Person, rng: np.random.Generator, duration_s: float, _ball: f
     on, off = ON * duration_s, OFF * duration_s
     for moments in (on, off):
         _step(sketch, first, moments, reach)
-    for side, leave, land in (
-        (first, 1, 2),
-        (other_side(first), 3, 4),
-    ):  # from mid-swing to mid-swing
-        start, end = np.mean((on[leave], on[land])), np.mean((off[leave], off[land]))
+    for side, swing in ((first, slice(1, 3)), (other_side(first), slice(3, 5))):
+        start, end = np.mean(on[swing]), np.mean(off[swing])  # from mid-swing to mid-swing
         sketch.feet[side].on_plate[:] = (sketch.t_s > start) & (sketch.t_s < end)
     sketch.pelvis_m[:, 0] += 0.5 * (sketch.feet["l"].ahead_m + sketch.feet["r"].ahead_m)
     moved_a_little(sketch, rng, 0.4, 0.3)
@@ -214,9 +201,9 @@ def _swing(foot: FootSketch, t: np.ndarray, start: float, end: float) -> np.ndar
 
 def _swing_arms(sketch: Sketch, side: str, degrees: float, ahead: np.ndarray) -> None:
     """Bring the other side's arm ahead with a foot, and the foot's own back."""
-    for name in SIDES:
-        swing = -1.0 if name == side else 1.0
-        sketch.angles[f"shoulder_{name}"][:, 0] += swing * np.deg2rad(degrees) * ahead
+    swing = np.deg2rad(degrees) * ahead
+    sketch.bend(f"shoulder_{side} 0", -swing)
+    sketch.bend(f"shoulder_{other_side(side)} 0", swing)
 
 
 # --- the identification sequence: blocks of movement in every joint, on two tracks at once --------
@@ -275,37 +262,36 @@ class Block:
         """(T,) 1 inside the block."""
         return window(self.sketch.t_s, self.start, self.end, ramp)
 
-    def size(self, low: Sequence[float], high: Sequence[float]) -> np.ndarray:
-        """Drawn amplitudes [rad] between bounds in degrees."""
-        return np.deg2rad(self.rng.uniform(low, high))
+    def size(self, least_deg: float, most_deg: float) -> float:
+        """A drawn amplitude [rad]; nothing is drawn where it is fixed."""
+        fixed = least_deg == most_deg
+        return np.deg2rad(least_deg if fixed else self.rng.uniform(least_deg, most_deg))
 
-    def trunk(self) -> None:
-        size, pace = self.size([22, 12, 18], [38, 22, 35]), (0.35, 1.1)
-        waist, bend = self.sketch.angles["waist"], self.wave(*pace)
-        bent = 0.6 * self.window(0.8) + 0.6 * bend
-        waist[:, 0] -= size[0] * bent
-        waist[:, 1] += size[1] * self.wave(*pace)
-        waist[:, 2] += size[2] * self.wave(*pace)
-        self.sketch.pelvis_angles[:, 0] -= 0.3 * size[0] * bent
+    def swing(self, name: str, side: str = "", *pace_hz: float) -> None:
+        """Angles of `swings.csv` about their middle, each at a pace of its own.
 
-    def turn(
-        self,
-        angles: np.ndarray,
-        size: np.ndarray,
-        *pace_hz: float,
-        other: np.ndarray | None = None,
-        part: float = 0.0,
-    ) -> None:
-        """Swing each column of angles (T, k) by a size of its own (k,), and ``other`` by a part."""
-        for axis, amount in enumerate(size):
-            wave = self.wave(*pace_hz)
-            angles[:, axis] += amount * wave
-            if other is not None:
-                other[:, axis] += part * amount * wave
+        Amplitudes of one joint are drawn before its paces. pace_hz : of rows that have none.
+        """
+        rows = [row for row in table("swings.csv") if row["swing"] == name]
+        for angle, group in groupby(rows, itemgetter("angle")):
+            drawn = [(row, self.size(*numbers(row, "least_deg", "most_deg"))) for row in group]
+            for row, size in drawn:
+                (wave, middle), shape = numbers(row, "wave", "middle"), np.zeros(1)
+                if middle:
+                    shape = middle * self.window(*numbers(row, "ramp_s"))
+                if wave:
+                    pace = numbers(row, "slow_hz", "fast_hz") if row["slow_hz"] else pace_hz
+                    shape = shape + wave * self.wave(*pace)
+                place = angle.replace("*", side)
+                self.sketch.bend(f"{place} {row['axis']}", size * shape)
+                if row["also"]:
+                    (part,) = numbers(row, "part")
+                    self.sketch.bend(f"{row['also']} {row['axis']}", part * size * shape)
 
-    def twist(self) -> None:
-        waist, pelvis = self.sketch.angles["waist"], self.sketch.pelvis_angles
-        self.turn(waist, self.size([10, 8, 25], [18, 14, 40]), 0.7, 1.6, other=pelvis, part=0.25)
+    def both(self, name: str, *pace_hz: float) -> None:
+        """The swings of the left side, then those of the right one."""
+        for side in SIDES:
+            self.swing(name, side, *pace_hz)
 
     def squats(self) -> None:
         count = max(1, round((self.end - self.start) / self.rng.uniform(1.15, 1.9)))
@@ -337,73 +323,46 @@ class Block:
         ahead = self.wave(0.35, 0.7)
         for side in SIDES:
             self.sketch.feet[side].cop_ahead_m += 0.045 * ahead
-        pelvis, waist = self.sketch.pelvis_angles, self.sketch.angles["waist"]
-        self.turn(pelvis, self.size([6, 4, 8], [12, 8, 15]), 0.5, 1.2, other=waist, part=-0.7)
-
-    def both_arms(self) -> None:
-        for side in SIDES:
-            self.arm_circle(side, 0.35, 0.8)
-
-    def arm_circle(self, side: str, *pace: float) -> None:
-        size, middle = self.size([35, 22, 20], [60, 38, 45]), self.window(0.8)
-        shoulder = self.sketch.angles[f"shoulder_{side}"]
-        shoulder[:, 0] += size[0] * (0.8 * middle + self.wave(*pace))
-        shoulder[:, 1] += size[1] * (1.2 * middle + self.wave(*pace))
-        shoulder[:, 2] += size[2] * self.wave(*pace)
-        bend = np.deg2rad(self.rng.uniform(10, 30))
-        self.sketch.angles[f"elbow_{side}"] += bend * (middle + self.wave(*pace))
+        self.swing("hips")
 
     def elbows(self) -> None:
-        middle = self.window(0.7)
         for side in SIDES:
-            size = np.deg2rad(self.rng.uniform(30, 50))
-            self.sketch.angles[f"elbow_{side}"] += size * (1.05 * middle + self.wave(0.7, 1.8))
+            size = self.size(30, 50)
+            bend = 1.05 * self.window(0.7) + self.wave(0.7, 1.8)
+            self.sketch.bend(f"elbow_{side}", size * bend)
             wave = self.wave(0.5, 1.0)
-            turn = np.deg2rad(self.rng.uniform(15, 40)) * wave
-            self.sketch.angles[f"shoulder_{side}"][:, 2] += turn
-
-    def wrists(self) -> None:
-        middle = self.window(0.7)
-        for side in SIDES:
-            bend = np.deg2rad(self.rng.uniform(50, 75))
-            self.sketch.angles[f"elbow_{side}"] += bend * middle
-            size = self.size([30, 10, 40], [50, 18, 65])
-            self.turn(self.sketch.angles[f"wrist_{side}"], size, 0.8, 2.2)
-
-    def head(self) -> None:
-        self.turn(self.sketch.angles["neck"], self.size([22, 15, 30], [38, 28, 55]), 0.5, 1.3)
-
-    def shrugs(self) -> None:
-        """Raise the shoulders, and bring them forward and back."""
-        for side in SIDES:
-            girdle = self.sketch.angles[f"girdle_{side}"]
-            self.turn(girdle, self.size([10, 10], [20, 20]), 0.5, 1.4)
+            self.sketch.bend(f"shoulder_{side} 2", self.size(15, 40) * wave)
 
     def free(self) -> None:
         """Arms, hands and head at once."""
-        self.head()
+        self.swing("head")
         for side in SIDES:
-            self.arm_circle(side, 0.5, 1.2)
-            self.sketch.angles[f"wrist_{side}"][:, 2] += np.deg2rad(40.0) * self.wave(0.8, 1.6)
+            self.swing("arm", side, 0.5, 1.2)
+            self.swing("hand", side)
+
+
+def numbers(row: dict[str, str], *columns: str) -> list[float]:
+    """Some columns of a row of the table."""
+    return [float(row[column]) for column in columns]
 
 
 Track = tuple[tuple[Callable[[Block], None], float], ...]
 """Blocks, and their parts of a cycle."""
 LOWER_TRACK: Track = (
-    (Block.trunk, 3.6),
+    (lambda block: block.swing("trunk"), 3.6),
     (Block.squats, 3.6),
     (lambda block: block.lift_leg("r", 1.0), 4.8),
-    (Block.twist, 3.0),
+    (lambda block: block.swing("twist"), 3.0),
     (lambda block: block.lift_leg("l", -1.0), 4.8),
     (Block.shift_weight, 3.0),
 )
 UPPER_TRACK: Track = (
-    (Block.both_arms, 3.6),
-    (lambda block: block.arm_circle("r", *FAST_HZ), 3.0),
-    (lambda block: block.arm_circle("l", *FAST_HZ), 3.0),
+    (lambda block: block.both("arm", 0.35, 0.8), 3.6),
+    (lambda block: block.swing("arm", "r", *FAST_HZ), 3.0),
+    (lambda block: block.swing("arm", "l", *FAST_HZ), 3.0),
     (Block.elbows, 3.2),
-    (Block.wrists, 3.2),
-    (Block.head, 3.0),
+    (lambda block: block.both("wrist"), 3.2),
+    (lambda block: block.swing("head"), 3.0),
     (Block.free, 3.6),
 )
-WITH_GIRDLE = (*UPPER_TRACK, (Block.shrugs, 3.2))
+WITH_GIRDLE: Track = (*UPPER_TRACK, (lambda block: block.both("shrug"), 3.2))

@@ -1,13 +1,14 @@
-"""Plans of people who leave their place: gait, hops and jumps."""
+"""Plans of people who leave their place (gait, hops and jumps), and the table of all movements."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from bsip_cli.simulate.kinematics import poses_of, turns_of
+from bsip_cli.simulate import standing
 from bsip_cli.simulate.numerics import bridge, glide, integral, soft_polyline, step
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 from bsip_cli.simulate.plan import (
@@ -20,7 +21,9 @@ from bsip_cli.simulate.plan import (
     moved_a_little,
     other_side,
     plate_under,
+    poses_of,
     sketch_for,
+    turns_of,
 )
 
 LONGEST_REACH = 0.985  # the knee stays bent, about 20 degrees
@@ -130,8 +133,8 @@ def _sketch(person: Person, gait: Gait, duration_s: float) -> Sketch:
     sketch.angles["waist"] -= np.stack([np.zeros_like(t), drop, 2.0 * turn], axis=1)
     for side in SIDES:
         swing = -SIDE_SIGN[side] * sign * np.cos(phase)
-        sketch.angles[f"shoulder_{side}"][:, 0] += gait.arm_swing_rad * swing
-        sketch.angles[f"elbow_{side}"] += gait.elbow_rad + 0.4 * gait.arm_swing_rad * swing
+        sketch.bend(f"shoulder_{side} 0", gait.arm_swing_rad * swing)
+        sketch.bend(f"elbow_{side}", gait.elbow_rad + 0.4 * gait.arm_swing_rad * swing)
     return sketch
 
 
@@ -181,24 +184,27 @@ TAKEOFF_M = 0.01  # height of the centre of mass at take-off and landing, agains
 STANCE_S = 0.30  # between hops
 IMPACT_S = (0.008, 0.070)  # start and end of the strike after touch-down
 MOST_HOPS = 12
+# Of a jump throw, in degrees at: start, bottom, take-off, release, landing, end.
+FLEXION, ELBOW = (0.0, 25.0, 85.0, 125.0, 90.0, 0.0), (30.0, 70.0, 85.0, 10.0, 20.0, 0.0)
+LEAN = (0.0, -28.0, -4.0, -3.0, -6.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
     """Equal jumps: dip to the bottom, push off, fly, are caught, and settle.
 
-    takeoffs_s, landings_s : (n,) of each flight. depth_m : of the first dip and last catch, against
-    standing. speed_m_s : at each take-off.
+    times_s : of start, bottom, each take-off and landing, caught, end. depth_m : of the first dip
+    and last catch, against standing. speed_m_s : at each take-off.
     """
 
-    start_s: float
-    bottom_s: float
-    takeoffs_s: np.ndarray
-    landings_s: np.ndarray
-    caught_s: float
-    end_s: float
+    times_s: list[float]
     depth_m: float
     speed_m_s: float
+
+    @property
+    def flights_s(self) -> list[tuple[float, float]]:
+        """Take-off and landing of each."""
+        return list(zip(self.times_s[2:-2:2], self.times_s[3:-2:2], strict=True))
 
 
 def basketball(
@@ -206,34 +212,31 @@ def basketball(
 ) -> Plan:
     """Squat, jump, let the ball go near the highest point, land, settle."""
     sketch = sketch_for(person, duration_s)
-    t, angles = sketch.t_s, sketch.angles
-    speed = rng.uniform(1.55, 1.85)
+    t, speed = sketch.t_s, rng.uniform(1.55, 1.85)
     depth = rng.uniform(0.115, 0.135) * person.stature_m
-    lengths = [0.0, 0.52, 0.24, 2.0 * speed / G, 0.24, 0.62]
-    start = max(0.12, 0.5 * (duration_s - lengths[1] - lengths[2] - lengths[3] - 0.24 - 0.62))
-    times = np.round(start + np.cumsum(lengths), 3)
-    start, bottom, takeoff, landing, caught, end = times.tolist()
-    speed = 0.5 * G * (landing - takeoff)
-    jump = Jumps(start, bottom, times[2:3], times[3:4], caught, end, depth, speed)
+    lengths = [0.52, 0.24, 2.0 * speed / G, 0.24, 0.62]  # dip, push, flight, catch, settle
+    before = max(0.12, 0.5 * (duration_s - sum(lengths)))
+    times = np.round(before + np.cumsum([0.0, *lengths]), 3).tolist()
+    start, bottom, takeoff, landing, _, end = times
+    jump = Jumps(times, depth, 0.5 * G * (landing - takeoff))
     side = str(rng.choice(SIDES, p=(0.1, 0.9)))
     release = 0.55 * takeoff + 0.45 * landing
     _move_feet(sketch, jump, 62.0, (0.20, 0.08), (0.08, 0.16), (0.25, 0.1, 0.15))
     apex = 0.5 * (takeoff + landing)
     overlap = 0.2 * (apex - takeoff)
-    up, down = glide(t, takeoff, apex + overlap, 0.06), glide(t, apex - overlap, landing, 0.06)
-    for foot in sketch.feet.values():
-        foot.raised_m[:, 1] += 0.85 * 0.5 * speed**2 / G * (up - down)
-    frames = np.array([start, bottom, takeoff, release, landing, end])
-    size = rng.uniform(0.9, 1.1)
-    flexion = size * np.deg2rad([0.0, 25.0, 85.0, 125.0, 90.0, 0.0])
-    elbow = size * np.deg2rad([30.0, 70.0, 85.0, 10.0, 20.0, 0.0])
-    lean = np.deg2rad([0.0, -28.0, -4.0, -3.0, -6.0, 0.0])
-    for name in SIDES:
-        angles[f"shoulder_{name}"][:, 0] += soft_polyline(t, frames, flexion, 0.05)
-        angles[f"elbow_{name}"] += soft_polyline(t, frames, elbow, 0.04)
-    angles["waist"][:, 0] += soft_polyline(t, frames, lean, 0.06)
-    sketch.pelvis_angles[:, 0] += soft_polyline(t, frames, 0.7 * lean, 0.06)
-    angles["neck"][:, 0] -= soft_polyline(t, frames, 1.3 * lean, 0.06)
+    _lift_feet(sketch, jump, 0.85, 0.06, [(apex + overlap, apex - overlap)])
+    frames, size = np.array([start, bottom, takeoff, release, landing, end]), rng.uniform(0.9, 1.1)
+    lean = np.deg2rad(LEAN)
+    for name, angles, softness_s in (
+        ("shoulder_l 0", size * np.deg2rad(FLEXION), 0.05),
+        ("shoulder_r 0", size * np.deg2rad(FLEXION), 0.05),
+        ("elbow_l", size * np.deg2rad(ELBOW), 0.04),
+        ("elbow_r", size * np.deg2rad(ELBOW), 0.04),
+        ("waist 0", lean, 0.06),
+        ("pelvis 0", 0.7 * lean, 0.06),
+        ("neck 0", -1.3 * lean, 0.06),
+    ):
+        sketch.bend(name, soft_polyline(t, frames, angles, softness_s))
     moved_a_little(sketch, rng, 0.3, 0.6)
     ball = held_ball(sketch, rng, side, release, ball_mass_kg)
     return _plan(sketch, rng, jump, _rise(sketch, jump), ball=ball, notes={"throwing_side": side})
@@ -245,39 +248,32 @@ def hops(person: Person, rng: np.random.Generator, duration_s: float, _ball: flo
     t = sketch.t_s
     dip, push, catch, settle = 0.50, 0.24, 0.26, 0.70
     flight = round(2.0 * rng.uniform(1.15, 1.45) / G, 3)
-    around = 0.5 + dip + push + catch + settle
-    room = duration_s - around + STANCE_S
+    room = duration_s - (0.5 + dip + push + catch + settle) + STANCE_S
     count = int(np.clip(np.floor(room / (flight + STANCE_S)), 1, MOST_HOPS))
     used = dip + push + count * flight + (count - 1) * STANCE_S + catch + settle
     start = round(max(0.1, 0.5 * (duration_s - used)), 3)
     takeoffs = start + dip + push + np.arange(count) * (flight + STANCE_S)
-    landings = np.round(takeoffs + flight, 3)
-    takeoffs = np.round(takeoffs, 3)
-    first, last = takeoffs[0], landings[-1]
-    depth = rng.uniform(0.075, 0.095) * person.stature_m
-    speed, caught = 0.5 * G * flight, last + catch
-    series = Jumps(start, start + dip, takeoffs, landings, caught, caught + settle, depth, speed)
+    flights = np.round(np.stack([takeoffs, takeoffs + flight], axis=1), 3)
+    first, last = flights[0, 0], flights[-1, 1]
+    caught, depth = last + catch, rng.uniform(0.075, 0.095) * person.stature_m
+    times = [start, start + dip, *np.ravel(flights), caught, caught + settle]
+    series = Jumps(times, depth, 0.5 * G * flight)
     impact = rng.uniform(1.0, 1.8) * G
     _move_feet(sketch, series, 42.0, (0.17, 0.06), (0.06, 0.12), (0.25, 0.05, 0.2))
-    for start, end in zip(takeoffs, landings, strict=True):
-        rise = 1.1 * (0.5 * (end - start))
-        up, down = glide(t, start, start + rise, 0.05), glide(t, end - rise, end, 0.05)
-        for foot in sketch.feet.values():
-            foot.raised_m[:, 1] += 0.8 * 0.5 * speed**2 / G * (up - down)
+    rises = ((a, b, 1.1 * (0.5 * (b - a))) for a, b in series.flights_s)
+    _lift_feet(sketch, series, 0.8, 0.05, [(a + rise, b - rise) for a, b, rise in rises])
     # elbows bent, swinging a little with the hops
-    ready = step(t, series.start_s, series.bottom_s) - step(t, last + 0.2, last + 0.8)
-    pace = 1.0 / (landings[0] - first + STANCE_S)
+    ready = step(t, start, start + dip) - step(t, last + 0.2, last + 0.8)
+    pace = 1.0 / (flights[0, 1] - first + STANCE_S)
     wave = ready * np.sin(2.0 * np.pi * pace * (t - first))
     swing, lean = np.deg2rad(rng.uniform(8.0, 14.0)), np.deg2rad(8.0) * ready
-    for side in SIDES:
-        sketch.angles[f"elbow_{side}"] += np.deg2rad(50.0) * ready
-        sketch.angles[f"shoulder_{side}"][:, 0] += swing * wave
-    sketch.pelvis_angles[:, 0] -= lean
-    sketch.angles["waist"][:, 0] -= 0.5 * lean
-    sketch.angles["neck"][:, 0] += lean
+    sketch.bend_both("elbow_*", np.deg2rad(50.0) * ready)
+    sketch.bend_both("shoulder_* 0", swing * wave)
+    for name, part in {"pelvis 0": -1.0, "waist 0": -0.5, "neck 0": 1.0}.items():
+        sketch.bend(name, part * lean)
     moved_a_little(sketch, rng, 0.3, 0.6)
     height = _rise(sketch, series)
-    for landing in landings:
+    for landing in flights[:, 1]:
         length = STANCE_S if landing < last else catch
         struck = (t >= landing) & (t <= landing + length)
         height[struck] += impact * _strike(int(struck.sum()), length)
@@ -294,10 +290,9 @@ def _plan(
     moment, mass = 0.0, sum(part.mass_kg for part in person.inertias.values())
     for body, part in person.inertias.items():
         moment += part.mass_kg * poses.point(body, part.com_m)[0, 1]
-    flights = zip(jumps.takeoffs_s, jumps.landings_s, strict=True)
     return sketch.plan(
         com_height_m=float(moment / mass) + rise_m,
-        flights=tuple((sketch.sample_of(a), sketch.sample_of(b)) for a, b in flights),
+        flights=tuple((sketch.sample_of(a), sketch.sample_of(b)) for a, b in jumps.flights_s),
         plate_centre_m=plate_under(sketch, rng),
         **options,
     )
@@ -306,23 +301,19 @@ def _plan(
 def _rise(sketch: Sketch, jumps: Jumps) -> np.ndarray:
     """(T,) rise of the centre of mass: septic pieces on the ground, a fall in flight."""
     t, v = sketch.t_s, jumps.speed_m_s
-    first, last = jumps.takeoffs_s[0], jumps.landings_s[-1]
     rest, bottom = np.zeros(4), np.array([-jumps.depth_m, 0.0, 1.0 * G, 0.0])
     leave, arrive = np.array([TAKEOFF_M, v, -G, 0.0]), np.array([TAKEOFF_M, -v, -G, 0.0])
-    height = np.zeros_like(t)
-    for start, end, a, b in (
-        (jumps.start_s, jumps.bottom_s, rest, bottom),
-        (jumps.bottom_s, first, bottom, leave),
-        (last, jumps.caught_s, arrive, bottom),
-        (jumps.caught_s, jumps.end_s, bottom, rest),
-    ):
+    height, times = np.zeros_like(t), jumps.times_s
+    on_ground = {0: (rest, bottom), 1: (bottom, leave), -3: (arrive, bottom), -2: (bottom, rest)}
+    for k, (before, after) in on_ground.items():
+        start, end = times[k], times[k + 1]
         inside = (t >= start) & (t <= end)
-        height[inside] = bridge(a, b, end - start, t[inside] - start)
-    for start, end in zip(jumps.takeoffs_s, jumps.landings_s, strict=True):
+        height[inside] = bridge(before, after, end - start, t[inside] - start)
+    for start, end in jumps.flights_s:
         air = (t > start) & (t < end)
         since = t[air] - start
         height[air] = TAKEOFF_M + v * since - 0.5 * G * since**2
-    for start, end in zip(jumps.landings_s[:-1], jumps.takeoffs_s[1:], strict=True):
+    for start, end in zip(times[3:-3:2], times[4:-3:2], strict=True):
         ground, stance = (t >= start) & (t <= end), end - start
         since = t[ground] - start  # a force of one hump turns -v into v
         lifted = (2.0 * v / stance + G) * stance**2 * _hump_twice(since / stance)
@@ -359,13 +350,45 @@ def _move_feet(
     roll_deg : of the heels, over push_s and catch_s about take-off and landing.
     toes_s : in which the load goes to the toes and comes back.
     """
-    t, first, last = sketch.t_s, jumps.takeoffs_s[0], jumps.landings_s[-1]
+    t, first, last = sketch.t_s, jumps.times_s[2], jumps.times_s[-3]
     early, late, back = toes_s
     toes = step(t, first - early, first - late) - step(t, last, last + back)
     for side, foot in sketch.feet.items():
         foot.cop_ahead_m += 0.42 * sketch.person.lengths_m[f"foot_{side}"] * toes
-        for start, end in zip(jumps.takeoffs_s, jumps.landings_s, strict=True):
+        for start, end in jumps.flights_s:
             push = step(t, start - push_s[0], start + push_s[1])
             catch = step(t, end - catch_s[0], end + catch_s[1])
             foot.toe_roll_rad += np.deg2rad(roll_deg) * (push - catch)
             foot.share[(t > start) & (t < end)] = 0.0
+
+
+def _lift_feet(
+    sketch: Sketch, jumps: Jumps, share: float, ramp_s: float, turns_s: list[tuple[float, float]]
+) -> None:
+    """In each flight by a share of its height.
+
+    turns_s : until when the feet rise and from when they sink, in each flight.
+    """
+    t, top = sketch.t_s, share * 0.5 * jumps.speed_m_s**2 / G
+    for (start, end), (risen, sinking) in zip(jumps.flights_s, turns_s, strict=True):
+        up, down = glide(t, start, risen, ramp_s), glide(t, sinking, end, ramp_s)
+        for foot in sketch.feet.values():
+            foot.raised_m[:, 1] += top * (up - down)
+
+
+Movement = Callable[[Person, np.random.Generator, float, float], Plan]
+"""(person, rng, duration_s, ball_mass_kg) -> plan."""
+MOVEMENTS: dict[str, tuple[Movement, float]] = {
+    "static": (standing.static, 2.0),
+    "sequence": (standing.sequence, 120.0),
+    "throwing": (standing.throwing, 3.0),
+    "basketball": (basketball, 3.0),
+    "squat": (standing.squat, 6.0),
+    "steps": (standing.steps, 5.0),
+    "walking": (walking, 1.2),
+    "running": (running, 0.8),
+    "hops": (hops, 5.0),
+    "stepon": (standing.stepon, 9.0),
+    "postures": (standing.postures, 35.0),
+}
+"""By task, the movement and its usual duration [s]."""

@@ -270,21 +270,24 @@ def _meaning(cell: str, pair: _Pair) -> Sex | None:
 def _spoken(cells: Collection[str], title: str) -> list[_Pair]:
     """The pairs of words that may stand behind a column's cells, in small letters.
 
-    Each understands all cells that are no words, and its language has all words. Hombre shows that
-    M is mujer: those go before the others that have words to which a cell may be the other one.
-    What begins no word of any, as 2 or X, is a mistake of its own.
+    Each understands all cells that are no words, and its language has all words; in a column of
+    several languages, one of them at least. Hombre shows that M is mujer: those go before the
+    others that have words to which a cell may be the other one. What begins no word of any, as 2 or
+    X, is a mistake of its own.
     """
     words = {cell for cell in cells if _SEX_OF.get(cell, OTHER) != OTHER}
     begun = {cell for cell in cells if cell not in _SEX_OF}
     begun = {cell for cell in begun if any(_meaning(cell, pair) for _, pair in _PAIRS)}
-    fitting = [
-        (k, pair)
-        for k, pair in _PAIRS
-        if all(_meaning(cell, pair) for cell in begun)
-        and words <= {word for other, one in _PAIRS if other == k for word in one}
-    ]
-    own = [(k, pair) for k, pair in fitting if title.casefold() in _LANGUAGES[k]]
-    pairs = [pair for _, pair in own or fitting]
+    known = {k: words & {w for i, pair in _PAIRS if i == k for w in pair} for k, _ in _PAIRS}
+    whole = [k for k, own in known.items() if own == words]
+    own = [k for k in whole if title.casefold() in _LANGUAGES[k]]
+
+    def understanding(languages: Collection[int]) -> list[_Pair]:
+        spoken = [pair for k, pair in _PAIRS if k in languages]
+        return [pair for pair in spoken if all(_meaning(cell, pair) for cell in begun)]
+
+    some = [k for k, words_of_it in known.items() if words_of_it]
+    pairs = understanding(own) or understanding(whole or some)
     alone = {word for word in words if not word.startswith(tuple(begun))}
     shown = [len(alone & {*pair}) for pair in pairs]
     return [pair for pair, n in zip(pairs, shown, strict=True) if n == max(shown)]

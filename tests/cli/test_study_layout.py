@@ -297,6 +297,10 @@ def test_feet_and_inches(empty_study, cells, taken, said):
         ("K E", "", "FM"),
         ("M Ž", "", "MF"),
         ("m w d", "", ["M", "F", "other"]),
+        # of several languages, where all of them agree
+        ("M F Mann female", "", "MFMF"),
+        ("Homme F Frau M", "", "MFFM"),
+        ("uomo M male F", "", "MMMF"),
         ("M F U", "", ["M", "F", "other"]),
     ],
 )
@@ -322,6 +326,7 @@ def sexes_of(root: Path, sexes: str, legend: str = "") -> tuple[list[str], list[
         ("V M", "write words in the whole column"),  # vrouw, varón, vyras
         ("M F N", "write words in the whole column"),
         ("Mujer M", "write words in the whole column"),  # mujer or masculino
+        ("male mujer M", "write words in the whole column"),
         ("D", "write words in the whole column"),  # donna, divers
     ],
 )

@@ -18,10 +18,9 @@ from bsip_cli.artifacts import is_made_from
 from bsip_cli.commands import named_causes as named
 from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.nameless import UNEXPLAINED
-from bsip_cli.effects.plates import ALL, Delay, loaded_plates
+from bsip_cli.effects.plates import ALL, Delay, GravityTilt, Turned, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash

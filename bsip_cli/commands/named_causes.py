@@ -11,10 +11,9 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
-from bsip_cli.effects.frames import Turned
 from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.nameless import UNEXPLAINED
-from bsip_cli.effects.plates import ALL, FrameRate, PlateZero
+from bsip_cli.effects.plates import ALL, FrameRate, PlateZero, Turned
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.trial_scene import causes_of
@@ -63,7 +62,9 @@ def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -
     shared = [
         one
         for one in causes
-        if one.effect.is_of_laboratory and is_corrected(one.effect) and others <= set(one.trials)
+        if one.effect.scope == "laboratory"
+        and is_corrected(one.effect)
+        and others <= set(one.trials)
     ]
     shared = shared if len(others) > 1 else []
     known = {(one.effect.name, one.target) for one in shared}

@@ -26,7 +26,7 @@ from bsip_cli.effects.loads import AddedMass, UnmeasuredContact
 from bsip_cli.effects.plates import PlateGain, PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words
-from bsip_cli.statistics.samples import effective_samples
+from bsip_cli.statistics.samples import Z95, effective_samples
 
 HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"
 STILL_M = 0.004  # root mean square distance of a hand that holds on from its mean place
@@ -68,7 +68,10 @@ class Support:
         numbers = (
             Number("start", "s", *[self.start_s] * 3),
             Number("end", "s", *[self.end_s] * 3),
-            *(Number.within(name, "N", x, e) for name, x, e in (("force", size, error), *parts)),
+            *(
+                Number.within(name, "N", x, Z95 * e)
+                for name, x, e in (("force", size, error), *parts)
+            ),
         )
         words = Words(f"{self.words()}, and what else may be wrong in this trial is not asked")
         said = UnmeasuredContact.name, "+".join(self.hands), (trial,), numbers, words
@@ -230,7 +233,7 @@ def stated_mass_findings(
     more["closing"] = f"; to distinguish them, {REMEDY}"
     findings = []
     for effect, target, name, unit, why, scope in causes:
-        size = Number.within(name, unit, per_share[unit] * share, per_share[unit] * mass_sd)
+        size = Number.within(name, unit, per_share[unit] * share, Z95 * per_share[unit] * mass_sd)
         words = Words(f"{found}: {why}, or the stated mass is wrong", why, found)
         said = effect, target, trials, (size,), words
         sure = p_value, (1 - p_value) / (len(causes) + 1)

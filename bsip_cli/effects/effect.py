@@ -15,7 +15,6 @@ import numpy as np
 
 from bsip_cli.effects.scene import Scene
 from bsip_cli.segments import in_words, the_joint
-from bsip_cli.statistics.samples import Z95
 
 _FILE = Path(__file__).with_name("catalogue.toml")
 ABOUT: dict[str, dict[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
@@ -252,9 +251,9 @@ class Number:
     high: float = np.nan
 
     @classmethod
-    def within(cls, name: str, unit: str, value: float, sd: float) -> Number:
-        """With the interval of a normal distribution."""
-        return cls(name, unit, value, value - Z95 * sd, value + Z95 * sd)
+    def within(cls, name: str, unit: str, value: float, half: float) -> Number:
+        """With an interval that reaches as far to either side."""
+        return cls(name, unit, value, value - half, value + half)
 
     def interval(self, is_signed: bool = True) -> str:
         """``1.87 to 2.14°``; without signs as sizes, if zero is not between them."""

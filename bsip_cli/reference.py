@@ -25,7 +25,7 @@ from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
 from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES, Stage
-from bsip_cli.report.effect_words import EFFECT_WORDS, usual_words
+from bsip_cli.report.causes import EFFECT_WORDS, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"

@@ -19,8 +19,7 @@ from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.prior import Prior
 from bsip_cli.identification.problem import Problem
 from bsip_cli.pipeline import Stage
-from bsip_cli.report.tables.formats import to_markdown
-from bsip_cli.report.tables.model import TEXTS, Column, Row, Table
+from bsip_cli.report.tables.model import TEXTS, Column, Row, Table, to_markdown
 from bsip_cli.report.words import listing, number, segment_label
 from bsip_cli.running.runner import Outcome, State, held_alone, lacking
 from bsip_cli.running.session import follow, open_study

@@ -14,7 +14,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
 from bsip_cli.errors import printable
 from bsip_cli.files.regular import check_regular
-from bsip_cli.report.tables.formats import to_markdown
+from bsip_cli.report.tables.model import to_markdown
 from bsip_cli.report.tables.published import audited, printed
 from bsip_cli.running.unit import library_versions
 from bsip_cli.schemas import SCHEMAS

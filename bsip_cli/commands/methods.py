@@ -16,7 +16,7 @@ from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
 from bsip_cli.report.blocks import environment
-from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.causes import effect_title
 from bsip_cli.report.records import flat
 from bsip_cli.report.words import TEXTS, listing
 

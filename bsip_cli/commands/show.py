@@ -13,12 +13,12 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.budget_words import BEFORE, numbered_pieces
-from bsip_cli.report.candidates import analysed, candidates_of, causes_of, effects_in
-from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
-from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
+from bsip_cli.report.budget import BEFORE, numbered_pieces
+from bsip_cli.report.causes import analysed, candidates_of, causes_of, effects_in
+from bsip_cli.report.cohort import named_sentences, unnamed_sentences
+from bsip_cli.report.cohort_record import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.errors import use_sentence
-from bsip_cli.report.participant.errors import largest_changes, moment_change, peaks_of
+from bsip_cli.report.joints import largest_changes, moment_change, peaks_of
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of

@@ -5,8 +5,7 @@ pseudo-inertia from the table's (Wensing 2018, Lee 2020, Rucker 2022) and by the
 about the table, the sum of the masses tied to the scale. Every segment is physically possible with
 any data. Errors of the kinematics follow the movement and look like parameters, so the data are
 trusted less than their residual says (``trust_ratio``). How far this person strays from the table
-in masses, centres and tensors and the weight of the log-det term follow from the data
-(``weights``).
+in centres and tensors and the weight of the log-det term follow from the data.
 """
 
 from __future__ import annotations
@@ -186,14 +185,15 @@ def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, bool]]:
 # approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): a spread is the
 # mean square of the deviations over the number of them that the data decided; the option
 # ``spread_weight`` says how many deviations as large as [prior] says count against them, so that
-# little data leave [prior] as it is. Masses share one spread and centres of mass another, neither
-# wider than [prior] says; the tensors of a pair of limbs, or of a segment of the midline, have
-# their own, because a table may miss a single one by far (Dumas 2007's trunk). Where the plates are
-# and when they read are two spreads more. The log-det weight is the best of a grid.
+# little data leave [prior] as it is. Centres of mass share one spread, never wider than [prior]
+# says; the tensors of a pair of limbs, or of a segment of the midline, have their own, because a
+# table may miss a single one by far (Dumas 2007's trunk). Masses keep that of [prior], which was
+# measured: from one body's dozen it comes out too narrow. Where the plates are and when they read
+# are two spreads more. The log-det weight is the best of a grid.
 
 
 _MASS, _CENTRE, _TENSOR = (0,), (1, 2, 3), (4, 5, 6, 7, 8, 9)  # of the readable parameters
-_NEVER_WIDER = slice(0, 2)  # of the spreads: masses, centres
+_CENTRES = 0  # of the spreads
 # At 6 the log-det term alone would spread people about as [prior] does. From a mere barrier to half
 # of that: it shapes what [prior] spreads, and little data must not make it a narrower prior.
 _GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0)
@@ -209,8 +209,8 @@ class Terms:
     units rounding would hide what the prior says about the latter.
 
     strength, right : of the weighted wrench residual 1/2 x^T diag(strength) x - right^T x.
-    spreads : precision of all masses, of all centres of mass, of each pair's tensors, and of the
-    instruments; fixed : that of the total mass, which keeps its weight. phi = table + shown x, and
+    spreads : precision of all centres of mass, of each pair's tensors, and of the instruments;
+    fixed : of all masses and of their sum, which keep their weights. phi = table + shown x, and
     what the instruments do wrong is instruments x, of x (m,).
     """
 
@@ -252,17 +252,17 @@ def terms_of(problem: Problem) -> Terms:
     rows = [prior.white[[10 * i + k for i in pair for k in kind]] for pair, kind in groups]
     masses = np.zeros(size)
     masses[::10] = np.where(prior.fixed, 0.0, 1 / prior.total_mass_sd_kg)
-    *body, total = (np.pad(x.T @ x, (0, beyond)) for x in (*rows, masses[None]))
+    own, *body, total = (np.pad(x.T @ x, (0, beyond)) for x in (*rows, masses[None]))
     on = np.eye(size + beyond)[size:]  # of the instruments: where the plates are, when they read
     spreads = [*body, *(on[k].T @ on[k] for k in INSTRUMENT_GROUPS if beyond)]
-    root = _inverse_root(sum(spreads, total))
+    root = _inverse_root(sum(spreads, own + total))
     strength, directions = np.linalg.eigh(root.T @ information @ root)
     axes = root @ directions
     return Terms(
         np.maximum(strength, 0.0),
         axes.T @ (right - information[:, :size] @ prior.phi),
         tuple(axes.T @ precision @ axes for precision in spreads),
-        axes.T @ total @ axes,
+        axes.T @ (own + total) @ axes,
         axes[:size],
         axes[size:],
         prior.phi,
@@ -306,7 +306,7 @@ def fit_with_weights(terms: Terms) -> Fit:
                 ]
             )
             new = np.clip(new, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
-            new[_NEVER_WIDER] = np.maximum(new[_NEVER_WIDER], 1.0)
+            new[_CENTRES] = max(new[_CENTRES], 1.0)
             fit = fit_at(terms, new, gamma, fit)
             if np.abs(np.log(new / old)).max() < _CONVERGED:
                 break
@@ -346,12 +346,12 @@ def estimate(problem: Problem) -> Estimate:
     """
     terms = terms_of(problem)
     fit, shown = fit_with_weights(terms), terms.shown
-    of_the_body = fit.spread[: 2 + len(problem.prior.pairs)]  # the instruments' come after
-    masses, centres, *tensors = 1 / np.sqrt(of_the_body)
+    of_the_body = fit.spread[: 1 + len(problem.prior.pairs)]  # the instruments' come after
+    centres, *tensors = 1 / np.sqrt(of_the_body)
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
-        f"masses lie {masses:.2f} standard deviations among people from the table, centres of mass "
-        f"{centres:.2f}, inertias {min(tensors):.2f} to {max(tensors):.2f}"
+        f"centres of mass lie {centres:.2f} standard deviations among people from the table, "
+        f"inertias {min(tensors):.2f} to {max(tensors):.2f}"
     )
     if fit.decided < _LITTLE:
         note += "; too little motion, or errors that hide what it shows"

@@ -17,7 +17,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from bsip_cli.errors import printable
-from bsip_cli.report.cause_colours import Piece, fills
+from bsip_cli.report.budget import Piece, fills
+from bsip_cli.report.errors import Yardstick
 from bsip_cli.report.words import TEXTS
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 Mark = Literal["", "better", "warning", "group"]
 Tone = Literal["plain", "good", "warning", "note"]
 State = Literal["fine", "cause", "large", "inconclusive"]
+Pairs = tuple[tuple[str, str], ...]
 
 
 class Block:
@@ -59,6 +61,13 @@ class Bullets(Block):
     tone: Tone = "plain"
 
 
+@dataclass(frozen=True)
+class Numbered(Block):
+    """A list whose items other texts refer to by their number."""
+
+    items: tuple[str, ...]
+
+
 def first_of(
     lines: Sequence[str], most: int, where: str, tone: Tone = "plain"
 ) -> tuple[Block, ...]:
@@ -68,17 +77,10 @@ def first_of(
 
 
 @dataclass(frozen=True)
-class Numbered(Block):
-    """A list whose items other texts refer to by their number."""
-
-    items: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Terms(Block):
     """Names, each with what is to be said of it."""
 
-    pairs: tuple[tuple[str, str], ...]
+    pairs: Pairs
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Links(Block):
     """Words and addresses (relative), one after the other, between a text and what follows."""
 
     text: str
-    to: tuple[tuple[str, str], ...]
+    to: Pairs
     rest: str = ""
 
 
@@ -117,28 +119,11 @@ class Bar(Block):
 
 
 @dataclass(frozen=True)
-class Scale:
-    """A number between what is good and what is too large, all in one unit; ``words`` say which it
-    is. Numbers are the texts that are shown; parts are of the whole scale, beyond whose end an
-    arrow points. ``other``: the same by other parameters; None where there are none."""
-
-    title: str
-    shown: str
-    words: str
-    part: float
-    good_part: float
-    limit_part: float
-    good: str
-    limit: str
-    is_beyond: bool = False
-    other: Scale | None = None
-
-
-@dataclass(frozen=True)
 class Scales(Block):
-    """Numbers side by side, each on its way to its limit."""
+    """Numbers side by side, each on its way to its limit: a yardstick, and the number; the same by
+    other parameters, None where there is none or it reads the same."""
 
-    scales: tuple[Scale, ...]
+    scales: tuple[tuple[Yardstick, float, float | None], ...]
 
 
 @dataclass(frozen=True)
@@ -237,25 +222,31 @@ _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-@cache
-def _template() -> Template:
-    """All texts in it are escaped."""
-    pages = environment(autoescape=True, finalize=_cleaned)
-    pages.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
-    pages.filters["tied"] = _tied
-    return pages.get_template("report.html.j2")
-
-
 def environment(**more: Any) -> Environment:
     """Of all templates of bsip."""
     more |= {"trim_blocks": True, "lstrip_blocks": True}
     return Environment(loader=FileSystemLoader(_TEMPLATES), undefined=StrictUndefined, **more)
 
 
+@cache
+def _page() -> Template:
+    """Escapes all texts; names of files and markers may hold control characters, which what
+    templates make does not; numbers and their units stay on one line."""
+
+    def cleaned(value: object) -> object:
+        is_foreign = isinstance(value, str) and not isinstance(value, Markup)
+        return printable(str(value)) if is_foreign else value
+
+    pages = environment(autoescape=True, finalize=cleaned)
+    pages.filters["as_base64"] = lambda svg: base64.b64encode(svg).decode("ascii")
+    pages.filters["tied"] = lambda text: re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
+    return pages.get_template("report.html.j2")
+
+
 def render(document: Document) -> str:
     """The page: figures as data, nothing from the network, no script at all; all texts escaped."""
     style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
-    return _template().render(document=document, style=style, files=FILES)
+    return _page().render(document=document, style=style, files=FILES)
 
 
 def words_in(blocks: Iterable[Block]) -> int:
@@ -263,17 +254,6 @@ def words_in(blocks: Iterable[Block]) -> int:
     page = render(Document("", "", tuple(blocks), ()))
     front = page.partition('<main id="front">')[2].partition("</main>")[0]
     return len(unescape(re.sub(r"<[^>]+>", " ", front)).split())
-
-
-def _cleaned(value: object) -> object:
-    """Names of files and markers may hold control characters; what templates make is clean."""
-    is_foreign = isinstance(value, str) and not isinstance(value, Markup)
-    return printable(str(value)) if is_foreign else value
-
-
-def _tied(text: str) -> str:
-    """Numbers and their units stay on one line."""
-    return re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
 
 
 # The glossary of every report.

@@ -10,10 +10,9 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Scale
-from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, signed
+from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, say
 from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.statistics.methods import METHODS, OM, RM, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
 
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
@@ -68,16 +67,8 @@ def one_number_alone(quantity: str, rm_mass: float, om: float) -> str:
     """What one number for the whole mass does without identification, in a sentence; ``rm_mass`` and
     ``om``: relative change of RM's error by these methods, -0.4 is 40 % less."""
     over_rm_mass = (1.0 + om) / (1.0 + rm_mass) - 1.0 if rm_mass > -1.0 else np.nan
-    if min(rm_mass, om) >= -SAME_WITHIN:
-        gained = "neither is better than the table"
-    elif over_rm_mass < -SAME_WITHIN:
-        gained = f"OM errs by {number(-100.0 * over_rm_mass, 0)} % less than {RM_MASS}"
-    else:
-        gained = "identification gains nothing over that number"
-    return (
-        f"One number for the whole mass alone ({RM_MASS}) changes RM's error in the {quantity} by "
-        f"{signed(100.0 * rm_mass)} %, OM by {signed(100.0 * om)} %: {gained}."
-    )
+    known = {"quantity": quantity, "rm_mass": rm_mass, "om": om, "over": over_rm_mass}
+    return say("one_number", same=SAME_WITHIN, **known)
 
 
 # --- which parameters ---------------------------------------------------------------------------
@@ -92,25 +83,26 @@ def use_sentence(
     """Which method, by how much it is better than the others, and in which movements another; from
     the artifacts of these names. ``waits``: what is to be done first; ``is_known``: what the method
     is has been said."""
+    full, brief = (TEXTS[name] for name in ("methods_in_full", "methods"))
+    if is_known:
+        full = brief = {method: method for method in METHODS}
     use = f"{waits} Then use" if waits else "Use"
     if choice is None or choice.empty:
-        return f"{use} {RM if is_known else TEXTS['methods_in_full'][RM]}: nothing was compared."
+        return f"{use} {full[RM]}: nothing was compared."
     first = choice.iloc[0]
-    brief = (lambda method: method) if is_known else TEXTS["methods"].__getitem__
     others = [
-        f"{brief(str(method))} for {listing(list(rows['movement']))}"
+        f"{brief[method]} for {listing(list(rows['movement']))}"
         + ("" if is_known else f", where OM is {'' if method == OM else 'not '}clearly better")
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    most = str(first["use"]) if is_known else TEXTS["methods_in_full"][str(first["use"])]
+    most = full[first["use"]]
     if others:
-        most = brief(str(first["use"]))
+        most = brief[first["use"]]
         most = f"else {most}" if is_known else f"{most} for all other movements"
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
     compared = _compared(first, together=bool(others), is_rare=OM in rare)
-    joined = ", " if is_known else ", and "
-    said = f"{use} {joined.join([*others, most])}{compared}."
+    said = f"{use} {(', ' if is_known else ', and ').join([*others, most])}{compared}."
     why = "what is wrong in the recordings gave it a body that fewer than 1 in 100 people have"
     return " ".join([said, *(f"Do not use {method}: {why}." for method in rare)])
 
@@ -118,11 +110,8 @@ def use_sentence(
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
     """What the choice rests on, to go on with after the method's name; ``together``: over movements
     of which some ask for another method; ``is_rare``: OM is ruled out by its body."""
-    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
-        return ": no recording is left to judge OM by"
-    om, scaled, over_scaled = (
-        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
-    )
+    changes = {x: _change(first[f"ratio_{x}"], first[f"log_error_{x}"]) for x in _PAIRS}
+    known = bool(np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all())
     n = int(first["trials"])
     every = "all " if together and n > 1 else ""
     others = "both other recordings" if every and n == 2 else every + count(n, "other recording")
@@ -130,16 +119,8 @@ def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
         "whole_trials": f"in {others} ",
         "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
     }.get(str(first["data"]), "")
-    if first["use"] == RM_MASS:
-        than_om = f"OM's error {over_scaled} than RM+mass's"
-        return f": {where}its error is {scaled} than RM's, and {than_om}"
-    said = f"{om} than RM's and RM+mass's"
-    if om != over_scaled:
-        said = f"{om} than RM's, {over_scaled} than RM+mass's"
-    if first["use"] == RM and not is_rare:
-        return f": OM is not clearly better; {where}its error is {said}"
-    whose = "its" if first["use"] == OM and not together else "OM's"
-    return f": {where}{whose} error is {said}"
+    methods = {"use": first["use"], "together": together, "is_rare": is_rare}
+    return say("compared", known=known, where=where, **methods, **changes)
 
 
 def _change(ratio: float, log_error: float) -> str:
@@ -166,7 +147,7 @@ SOURCES = (
     "(Hicks 2015; markers: OpenSim)."
 )
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
-_MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
+_MARKER_GOOD_MM, MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
 
@@ -204,13 +185,22 @@ class Yardstick:
             return "bad: large"
         return "good" if value <= self.good else "acceptable"
 
-    def scale(self, value: float) -> Scale:
-        """On a scale from nothing to a fixed multiple of the limit, in every report the same."""
-        end = ENDS_AT * self.limit
-        part = min(value / end, 1.0) if np.isfinite(value) else 0.0
-        words = self.title, f"{number(value)} {self.unit}", self.words(value)
-        marks, is_beyond = (f"{self.good:.2g}", number(self.limit, 0)), bool(value > end)
-        return Scale(*words, part, self.good / end, self.limit / end, *marks, is_beyond)
+    def shown(self, value: float) -> str:
+        return f"{number(value)} {self.unit}"
+
+    @property
+    def end(self) -> float:
+        """Of its scale, in every report the same."""
+        return ENDS_AT * self.limit
+
+    @property
+    def marks(self) -> tuple[tuple[float, str], tuple[float, str]]:
+        """Part of the scale, and text, of what is good and of what is large."""
+        return (self.good / self.end, f"{self.good:.2g}"), (1 / ENDS_AT, number(self.limit, 0))
+
+    def part(self, value: float) -> float:
+        """Of the scale; 0 of what is not known."""
+        return min(value / self.end, 1.0) if np.isfinite(value) else 0.0
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:
@@ -220,7 +210,7 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
     return (
         Yardstick(COP, "Centre of pressure (COP) error", "COP", "mm", *cop),
         Yardstick(FORCE, "Vertical force error", "vertical force", "% of body weight", *force),
-        Yardstick(MARKERS, "Markers from model", "marker", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
+        Yardstick(MARKERS, "Markers from model", "marker", "mm", _MARKER_GOOD_MM, MARKER_LIMIT_MM),
     )
 
 
@@ -240,12 +230,8 @@ def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
         rms, percent = of["rmse"].to_dict(), of["rmse_percent_bw"].to_dict()
         cop = float(np.hypot(rms.get("cop_ap", np.nan), rms.get("cop_ml", np.nan)))
         held_out = bool((of["data"] == "held_out").any())
-        force = float(percent.get("grf_vertical", np.nan))
-        rows.append({COP: cop, FORCE: force, "held_out": held_out})
-    known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
-    chosen = [row for row in known if row["held_out"]] or known
-    found = {}
-    for name in (COP, FORCE):
-        sizes = [row[name] for row in chosen if np.isfinite(row[name])]
-        found[name] = float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
-    return found
+        rows.append((cop, float(percent.get("grf_vertical", np.nan)), held_out))
+    table = pd.DataFrame(rows, columns=[COP, FORCE, "held_out"], dtype=float)
+    known = table[table[[COP, FORCE]].notna().any(axis=1)]
+    chosen = known[known["held_out"] > 0] if known["held_out"].any() else known
+    return {name: float(np.sqrt((chosen[name] ** 2).mean())) for name in (COP, FORCE)}

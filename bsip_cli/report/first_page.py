@@ -8,28 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from bsip_cli.report import blocks, budget_words, errors, verdict
-from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, analysed, effects_in
-from bsip_cli.report.effect_words import effect_title, separating_recording
-from bsip_cli.report.error_shape import shape_of
-from bsip_cli.report.participant.errors import all_peaks, moment_change
-from bsip_cli.report.recordings import (
-    beyond,
-    is_said,
-    large_alone,
-    large_finding,
-    largest_in,
-    light_for,
-    main_part,
-    measured_of,
-    must_wait,
-    names_of,
-    number_of_main_part,
-    numbered,
-    om_waits,
-    use_lines,
-    worst_of,
+from bsip_cli.report import blocks, errors, recordings, verdict
+from bsip_cli.report import budget as budgets
+from bsip_cli.report.causes import (
+    OF_THE_WEIGHT,
+    Cause,
+    analysed,
+    effect_title,
+    effects_in,
+    separating_recording,
 )
+from bsip_cli.report.joints import all_peaks, moment_change
+from bsip_cli.report.recordings import large_finding, names_of
 from bsip_cli.report.records import HowMade, ParticipantRecord, TrialRecord
 from bsip_cli.report.words import (
     TEXTS,
@@ -56,7 +46,7 @@ _POSES = 8  # among which the one is chosen that is shown
 def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
     """The blocks of the first page, in the order in which a reader asks; as many findings as there
     is room for."""
-    light = light_for(record)
+    light = recordings.light_for(record)
     says_it = light.state in ("large", "cause") and (record.causes or large_finding(record))
     first = (
         *portrait(record),
@@ -64,28 +54,30 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
     )
-    then = (*_sizes(record), *_sure(record, light), *_use(record))
+    known = record.choice, record.identification
+    use = errors.use_sentence(*known, recordings.must_wait(record), is_known=True)
+    then = (
+        *_sizes(record),
+        *_sure(record, light),
+        blocks.Heading("What may be used?"),
+        blocks.Bullets(tuple(recordings.use_lines(record))),
+        blocks.Paragraph(use),
+        blocks.Heading("What to do next"),
+    )
     for most, named in _FINDINGS:
-        causes, last = _causes(record, most, named), _next(record, light, most)
-        page = *first, *causes, *then, *last
+        said, shown = to_do(record, light, most), _causes_shown(record, most)
+        page = (
+            *first,
+            *_causes(record, shown, named),
+            *then,
+            blocks.Bullets(tuple(said[:_MOST_TO_DO])),
+        )
+        if len(said) > _MOST_TO_DO or len(shown) < len(record.causes):
+            steps = (("Steps for all findings", f"#{verdict.ALL_FAULTS}"),)
+            page = *page, blocks.Links("", steps)
         if blocks.words_in(page) <= _MOST_WORDS:
             break
     return page
-
-
-def _use(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    yield blocks.Heading("What may be used?")
-    yield blocks.Bullets(tuple(use_lines(record)))
-    known = record.choice, record.identification
-    yield blocks.Paragraph(errors.use_sentence(*known, must_wait(record), is_known=True))
-
-
-def _next(record: ParticipantRecord, light: blocks.Light, most: int) -> Iterator[blocks.Block]:
-    said = to_do(record, light, most)
-    yield blocks.Heading("What to do next")
-    yield blocks.Bullets(tuple(said[:_MOST_TO_DO]))
-    if len(said) > _MOST_TO_DO or len(_causes_shown(record, most)) < len(record.causes):
-        yield blocks.Links("", (("Steps for all findings", f"#{verdict.ALL_FAULTS}"),))
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -124,12 +116,11 @@ def _recorded(record: ParticipantRecord) -> str:
 
 def _files(record: ParticipantRecord) -> str:
     """Names of few; of many how many there are, and how they begin and end."""
-    stems, begin = tuple(f"{trial.stem}." for trial in record.trials), f"{record.id}_"
+    stems = tuple(f"{trial.stem}." for trial in record.trials)
     names = sorted(n for n in HowMade.of(record.origins).files if n.startswith(stems))
-    if len(names) > _MOST_FILES:
-        kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
-        return f"{len(names)} ({begin}*{listing(kinds)})"
-    return listing(names)
+    kinds = sorted({f".{name.rpartition('.')[2]}" for name in names})
+    many = f"{len(names)} ({record.id}_*{listing(kinds)})"
+    return many if len(names) > _MOST_FILES else listing(names)
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -141,11 +132,11 @@ def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
 
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
     how = anterior, record.body_weight(), _POSES
-    moved = [(one, one.kinematics) for one in record.trials if one.kinematics is not None]
     found = [
         (trial, pose)
-        for trial, kinematics in moved
-        for pose in poses_of(record.body, kinematics, trial.reconstruction, *how)
+        for trial in record.trials
+        if trial.kinematics is not None
+        for pose in poses_of(record.body, trial.kinematics, trial.reconstruction, *how)
     ]
     if not found:
         return ()
@@ -159,35 +150,33 @@ def portrait(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
 # --- is anything wrong --------------------------------------------------------------------------
 
 
-def _causes(record: ParticipantRecord, most: int, named: int) -> Iterator[blocks.Block]:
+def _causes(
+    record: ParticipantRecord, shown: Sequence[Cause], named: int
+) -> Iterator[blocks.Block]:
     """A line per finding, the most important first; of those that have no room what they are.
-    ``most``: findings in full; ``named``: kinds of findings of which only the name is given."""
+    ``shown``: in full; ``named``: kinds of findings of which only the name is given."""
     if record.diagnosis is None or record.detection is None:
         return
     everywhere = analysed(record.detection, record.diagnosis)
-    peaks, large = all_peaks(record.trials), large_finding(record)
-    shown = _causes_shown(record, most)
+    peaks = all_peaks(record.trials)
+    at_joints = (moment_change(cause, record.causes, peaks) for cause in shown)
     lines = [
-        verdict.cause_line(cause, everywhere, moment_change(cause, record.causes, peaks))
-        for cause in shown
+        *large_finding(record),
+        *(verdict.cause_line(c, everywhere, x) for c, x in zip(shown, at_joints, strict=True)),
     ]
-    if large or lines:
-        yield blocks.Numbered((*large, *lines))
-    if more := record.causes[len(shown) :]:
-        address = (("More below", f"#{verdict.ALL_FAULTS}"),)
-        first = 1 + len(large) + len(shown)
-        yield blocks.Links(
-            "", address, f". {'; '.join(_in_brief(more, first, named, names_of(record)))}."
-        )
+    if lines:
+        yield blocks.Numbered(tuple(lines))
+    if len(shown) < len(record.causes):
+        more = {k: c for k, c in recordings.numbered(record).items() if k > len(lines)}
+        rest = f". {'; '.join(_in_brief(more, named, names_of(record)))}."
+        yield blocks.Links("", (("More below", f"#{verdict.ALL_FAULTS}"),), rest)
 
 
-def _in_brief(
-    causes: Sequence[Sequence[Candidate]], first: int, named: int, names: Mapping[str, str]
-) -> Iterator[str]:
-    """``3 and 5: marker not in its place``, one alone as it is; findings of which one may be the other count together,
-    by the name that most of them may have."""
+def _in_brief(causes: Mapping[int, Cause], named: int, names: Mapping[str, str]) -> Iterator[str]:
+    """``3 and 5: marker not in its place``, one alone as it is; findings of which one may be the
+    other count together, by the name that most of them may have."""
     groups: list[tuple[list[int], list[str]]] = []
-    for k, cause in enumerate(causes, first):
+    for k, cause in causes.items():
         titles = [effect_title(one.effect) for one in cause]
         mine = [group for group in groups if {*group[1]} & {*titles}]
         merged = [k, *(n for numbers, _ in mine for n in numbers)]
@@ -196,7 +185,7 @@ def _in_brief(
         groups.append((sorted(merged), titles))
     groups.sort()
     for numbers, titles in groups[:named]:
-        own = causes[numbers[0] - first]
+        own = causes[numbers[0]]
         what = own[0].words.short or own[0].words.what
         if len(numbers) == len(own) == 1 and len(what.split()) <= _BRIEF_WORDS:
             where = [names[stem] for stem in own[0].trials if stem in names]
@@ -209,7 +198,7 @@ def _in_brief(
         yield f"{rest} more"
 
 
-def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Sequence[Candidate], ...]:
+def _causes_shown(record: ParticipantRecord, most: int) -> tuple[Cause, ...]:
     return record.causes[: most - len(large_finding(record))]
 
 
@@ -218,16 +207,13 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     made."""
     if record.diagnosis is None or record.detection is None:
         return
-    unseen = verdict.unseen(record.detection, record.diagnosis)
-    said = []
+    said = [verdict.unseen(record.detection, record.diagnosis)]
     if light.state == "large":
-        part, is_left = main_part(record)
+        part, is_left = recordings.main_part(record)
         known = "unknown" if part is None else "part" if is_left else "known"
-        said.append(TEXTS["sure"][known])
-        unseen = unseen if known == "known" else ""
+        said = [TEXTS["sure"][known], *(said if known == "known" else [])]
     elif not record.causes:
-        said.append("No fault is more probable than not.")
-    said.append(unseen)
+        said = ["No fault is more probable than not.", *said]
     if text := " ".join(filter(None, said)):
         yield blocks.Heading("How sure is this?")
         yield blocks.Paragraph(text)
@@ -239,17 +225,17 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
-    used, first, other = record.use_words(), measured_of(record), measured_of(record, RM)
-    later = " (not yet)" if must_wait(record) else ""
+    used = record.use_words()
+    first, other = recordings.measured_of(record), recordings.measured_of(record, RM)
+    later = " (not yet)" if recordings.must_wait(record) else ""
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
-    if om_waits(record):
+    if recordings.om_waits(record):
         first, other = other, first
         which = f"? ● {RM}, ○ {used}{later}"
-    scales = []
-    for (one, size), (_, beside) in zip(first, other, strict=True):
-        scale, next_to_it = one.scale(size), one.scale(beside)
-        is_other = scale.shown != next_to_it.shown
-        scales.append(replace(scale, other=next_to_it) if is_other else scale)
+    scales = [
+        (one, size, None if one.shown(other[one]) == one.shown(size) else other[one])
+        for one, size in first.items()
+    ]
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
     yield blocks.Paragraph(errors.SOURCES, "note")
@@ -260,15 +246,12 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """What makes the error of the table's parameters, as one bar, and how to read it."""
     if record.budget is None:
         return
-    findings = {k: effects_in([cause]) for k, cause in numbered(record).items()}
-    if pieces := budget_words.numbered_pieces(record.budget, findings):
-        use = record.use()
-        if use == OM and not (om_waits(record) or beyond(record)):
-            known = f"{budget_words.PARAMETERS} (OM corrects these)"
-            pieces = tuple(
-                replace(one, label=one.label.replace(budget_words.PARAMETERS, known))
-                for one in pieces
-            )
+    findings = {k: effects_in([cause]) for k, cause in recordings.numbered(record).items()}
+    if pieces := budgets.numbered_pieces(record.budget, findings):
+        use, own = record.use(), budgets.PARAMETERS
+        if use == OM and not (recordings.om_waits(record) or recordings.beyond(record)):
+            known = f"{own} (OM corrects these)"
+            pieces = tuple(replace(one, label=one.label.replace(own, known)) for one in pieces)
         before = " with RM" if use != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 
@@ -289,33 +272,31 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
         on_scale = cause[0].class_id == OF_THE_WEIGHT
         step = "weigh the person on a scale" if on_scale else separating_recording(members, most=1)
         said.append(f"To learn the cause of finding {k}, {step}.")
-    if not beyond(record):
-        alone = (_look_for(record, *largest_in(record, one)) for one in large_alone(record))
-        said += filter(None, alone)
-    if light.state == "inconclusive" and not beyond(record):
-        said.append(TEXTS["to_do"]["contacts"])
-    if light.state == "fine" and not said:
-        said.append(TEXTS["usable"]["fine"])
+    if not recordings.beyond(record):
+        alone = recordings.large_alone(record)
+        looks = (_look_for(record, *recordings.largest_in(record, one)) for one in alone)
+        said += filter(None, looks)
+        said += [TEXTS["to_do"]["contacts"]] if light.state == "inconclusive" else []
+    fine = [TEXTS["usable"]["fine"]] if light.state == "fine" and not said else []
     rows = record.excitation.query("quantity == 'next'")
-    if said in ([], [TEXTS["usable"]["fine"]]) and len(rows):
+    if not said and len(rows):
         text = rows["text"].iloc[0]
-        said.append(f"Optional, to know the parameters better, record: {text}.")
-    return said
+        fine.append(f"Optional, to know the parameters better, record: {text}.")
+    return said + fine
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
     """Where to look for what makes the largest error, which is the first finding; nothing where
     another finding makes the largest part."""
-    if number_of_main_part(record):
+    if recordings.number_of_main_part(record):
         return
-    is_finding = bool(large_finding(record)) or is_said(record)
-    number_of_it = "Finding 1: " if is_finding else ""
-    for one, _ in beyond(record)[:1]:
-        worst = worst_of(record, one)
-        if one.name == errors.MARKERS:
-            yield f"{number_of_it}{TEXTS['to_do']['markers']}"
-        elif worst is not None and (text := _look_for(record, worst, one)):
-            yield f"{number_of_it}{text}"
+    is_finding = bool(large_finding(record)) or recordings.is_said(record)
+    for one, _ in recordings.beyond(record)[:1]:
+        worst = recordings.worst_of(record, one)
+        text = TEXTS["to_do"]["markers"] if one.name == errors.MARKERS else ""
+        text = text or (_look_for(record, worst, one) if worst else "")
+        if text:
+            yield f"{'Finding 1: ' if is_finding else ''}{text}"
 
 
 _OF = {errors.COP: ("cop_ap", "cop_ml"), errors.FORCE: ("fz",)}  # components of the error budget
@@ -327,7 +308,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
     finding; where it is not known, when the error is largest and what to check first."""
     name, found, texts = names_of(record)[trial.stem], effects_in(record.causes), TEXTS["to_do"]
     budget, of = record.budget, (trial.stem, _OF[error.name])
-    if budget is not None and (parts := budget_words.overall_pieces(budget, found, *of)):
+    if budget is not None and (parts := budgets.overall_pieces(budget, found, *of)):
         main = max(parts, key=lambda one: one.share)
         if {term.partition(":")[2] for term in main.terms} & found:
             return ""
@@ -336,7 +317,7 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
             return texts["part"].format(
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
-    shape = shape_of(trial.reconstruction, record.use(trial.task), _SIGNALS[error.name])
+    shape = recordings.shape_of(trial.reconstruction, record.use(trial.task), _SIGNALS[error.name])
     if shape is None:
         return ""
     when, check = texts["shapes"][shape.kind]

@@ -1,19 +1,27 @@
-"""How large the errors of a person's recordings are with the parameters to use; which recordings may
-still be used, and for what."""
+"""How large the errors of a person's recordings are with the parameters to use, and when; which
+recordings may still be used, and for what."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import pandas as pd
 
 from bsip_cli.report import verdict
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.candidates import OF_THE_WEIGHT, Candidate, effects_in, is_large
-from bsip_cli.report.cause_colours import Piece
-from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title
+from bsip_cli.report.budget import Piece
+from bsip_cli.report.causes import (
+    EFFECT_WORDS,
+    OF_THE_WEIGHT,
+    Candidate,
+    Cause,
+    effect_title,
+    effects_in,
+    is_large,
+)
 from bsip_cli.report.errors import (
     COP,
     COP_LIMIT_M,
@@ -24,9 +32,9 @@ from bsip_cli.report.errors import (
     errors_of,
     yardsticks,
 )
-from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import TEXTS, findings, listing, number, task_of, trial_label
-from bsip_cli.statistics.methods import OM, RM
+from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
+from bsip_cli.report.words import TEXTS, findings, listing, number, say, task_of, trial_label
+from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 _IN_THE_MODEL = {"person", "skin", "unnamed"}  # families of what nobody can correct or state
 _OF_THE_MOTION = {"motion", "frame"}  # families of what makes the motion wrong
@@ -39,10 +47,34 @@ _once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 # --- how large ----------------------------------------------------------------------------------
 
 
-def measured_of(record: ParticipantRecord, method: str = "") -> tuple[tuple[Yardstick, float], ...]:
+def _sizes(
+    record: ParticipantRecord, trials: Sequence[TrialRecord], markers_mm: float, method: str = ""
+) -> dict[Yardstick, float]:
+    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials."""
+    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
+    fits = [
+        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
+        for trial in trials
+        if trial.fit is not None
+    ]
+    values = errors_of(fits) | {MARKERS: markers_mm}
+    return {one: values[one.name] for one in yardsticks(*limits)}
+
+
+def measured_of(record: ParticipantRecord, method: str = "") -> dict[Yardstick, float]:
     """The three yardsticks with this person's numbers, by a method, or by the one to use."""
     markers_mm = 1e3 * float(record.facts["marker_rms_m"])
-    return _measured(record, record.moving_trials(), markers_mm, method)
+    return _sizes(record, record.moving_trials(), markers_mm, method)
+
+
+@_once
+def _of_each(record: ParticipantRecord) -> dict[str, dict[Yardstick, float]]:
+    """The yardsticks with the numbers of each recording, by its stem."""
+    return {one.stem: _sizes(record, [one], one.markers_mm()) for one in record.trials}
+
+
+def _large(sizes: Mapping[Yardstick, float]) -> list[tuple[Yardstick, float]]:
+    return [(one, size) for one, size in sizes.items() if one.is_large(size)]
 
 
 @_once
@@ -60,54 +92,26 @@ def large_alone(record: ParticipantRecord, with_markers: bool = False) -> list[T
 
 def worst_of(record: ParticipantRecord, yardstick: Yardstick) -> TrialRecord | None:
     """The recording in motion where an error is largest; None where none has it."""
-    sizes = {
-        trial.stem: size
-        for trial in record.moving_trials()
-        for one, size in _of_each(record)[trial.stem]
-        if one == yardstick and np.isfinite(size)
-    }
-    worst = max(sizes, key=sizes.__getitem__, default="")
-    return next((trial for trial in record.trials if trial.stem == worst), None)
+    sizes = [(_of_each(record)[trial.stem][yardstick], trial) for trial in record.moving_trials()]
+    known = [(size, trial) for size, trial in sizes if np.isfinite(size)]
+    return max(known, key=lambda one: one[0])[1] if known else None
 
 
 def largest_in(record: ParticipantRecord, trial: TrialRecord) -> tuple[TrialRecord, Yardstick]:
     """The recording, and which of its errors of the forces is farthest beyond its yardstick."""
-    own = [pair for pair in _of_each(record)[trial.stem] if pair[0].name != MARKERS]
+    own = [pair for pair in _of_each(record)[trial.stem].items() if pair[0].name != MARKERS]
     return trial, max(own, key=lambda pair: np.nan_to_num(pair[1]) / pair[0].limit)[0]
 
 
 @_once
 def names_of(record: ParticipantRecord) -> dict[str, str]:
     """Stem of each recording: its task; ``swing run 3`` where it is not the only one."""
-    tasks = [task_of(trial.stem) for trial in record.trials]
+    stems = [trial.stem for trial in record.trials]
+    tasks = [*map(task_of, stems)]
     return {
-        trial.stem: task if tasks.count(task) == 1 else trial_label(trial.stem, "{} {}")
-        for trial, task in zip(record.trials, tasks, strict=True)
+        stem: task if tasks.count(task) == 1 else trial_label(stem, "{} {}")
+        for stem, task in zip(stems, tasks, strict=True)
     }
-
-
-def _measured(
-    record: ParticipantRecord, trials: Sequence[TrialRecord], markers_mm: float, method: str = ""
-) -> tuple[tuple[Yardstick, float], ...]:
-    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials."""
-    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
-    fits = [
-        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
-        for trial in trials
-        if trial.fit is not None
-    ]
-    values = errors_of(fits) | {MARKERS: markers_mm}
-    return tuple((one, values[one.name]) for one in yardsticks(*limits))
-
-
-@_once
-def _of_each(record: ParticipantRecord) -> dict[str, tuple[tuple[Yardstick, float], ...]]:
-    """The yardsticks with the numbers of each recording, by its stem."""
-    return {one.stem: _measured(record, [one], one.markers_mm()) for one in record.trials}
-
-
-def _large(sizes: Sequence[tuple[Yardstick, float]]) -> list[tuple[Yardstick, float]]:
-    return [(one, size) for one, size in sizes if one.is_large(size)]
 
 
 # --- the answer, and the finding that it is -------------------------------------------------------
@@ -134,18 +138,20 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     found = beyond(record)
     if not found or is_said(record) or light_for(record).state != "large":
         return ()
-    errors = [one.short() for one, _ in found]  # of several the yardsticks have the sizes
-    if len(found) == 1:
-        errors[0] += f" {number(found[0][1])} {found[0][0].brief_unit()}"
-    said = f"Large error with {record.use_words()}: {listing(errors)}"
-    worst = worst_of(record, found[0][0])
-    if worst is not None:
-        said += f", most in {names_of(record)[worst.stem]}"
-        own = next(size for one, size in _of_each(record)[worst.stem] if one == found[0][0])
-        if (size := number(own)) != number(found[0][1]):  # of all recordings together
-            said += f" ({size} {found[0][0].brief_unit()})"
-    why = "" if all(one.name == MARKERS for one, _ in found) else _why_large(record, worst)
-    return (f"{said}; {why}." if why else f"{said}.",)
+    first, size = found[0]
+    worst = worst_of(record, first)
+    own = _of_each(record)[worst.stem][first] if worst else size
+    said = say(
+        "large_finding",
+        used=record.use_words(),
+        errors=[one.short() for one, _ in found],  # of several the yardsticks have the sizes
+        size=number(size),
+        unit=first.brief_unit(),
+        worst=names_of(record)[worst.stem] if worst else "",
+        own=number(own),
+        why="" if all(one.name == MARKERS for one, _ in found) else _why_large(record, worst),
+    )
+    return (said,)
 
 
 def is_said(record: ParticipantRecord) -> bool:
@@ -161,25 +167,29 @@ def _why_large(record: ParticipantRecord, worst: TrialRecord | None) -> str:
     """What makes the largest part, as far as the budget of the parameters to use tells; nothing
     where the light says it."""
     part, is_left = main_part(record)
-    if part is None:
-        if worst is not None and any(_concerns(cause, worst) for cause in record.causes):
-            return "other findings explain part at most"
-        if verdict.OF_IT_UNKNOWN in light_for(record).title:
-            return "" if record.causes else verdict.NONE_FOUND
-        return "cause unknown" if record.causes else f"cause unknown: {verdict.NONE_FOUND}"
-    besides = " besides the table's parameters" if is_left else ""
-    if number_of := _number_of(record, part):
-        return f"the largest part{besides} is finding {number_of}"
-    in_title = part.label in light_for(record).title
-    return "" if in_title else f"the largest part{besides} is {part.label}"
+    is_found = worst is not None and any(_concerns(cause, worst) for cause in record.causes)
+    return say(
+        "why_large",
+        part=part.label if part else "",
+        number=_number_of(record, part) if part else 0,
+        besides=" besides the table's parameters" if is_left else "",
+        other_findings=is_found,
+        any_finding=bool(record.causes),
+        title=light_for(record).title,
+        none_found=verdict.NONE_FOUND,
+    )
 
 
 def main_part(record: ParticipantRecord) -> tuple[Piece | None, bool]:
-    """As `verdict.main_part`, of this person."""
-    return verdict.main_part(record.budget, effects_in(record.causes), record.use())
+    """Of a large error, what makes the largest part; None if unknown, so that nothing is of unknown
+    cause whose bar has no such part. And whether that is what OM has left."""
+    found = effects_in(record.causes)
+    ranked, is_left = verdict.ranked_parts(record.budget, found, record.use())
+    is_known = bool(ranked) and ranked[0].label not in verdict.NO_CAUSE
+    return (ranked[0] if is_known else None), is_left
 
 
-def numbered(record: ParticipantRecord) -> dict[int, tuple[Candidate, ...]]:
+def numbered(record: ParticipantRecord) -> dict[int, Cause]:
     """What the diagnosis found, by its number in the report."""
     return dict(enumerate(record.causes, start=1 + len(large_finding(record))))
 
@@ -218,24 +228,25 @@ def use_lines(record: ParticipantRecord) -> Iterator[str]:
     if light_for(record).state == "inconclusive":
         yield TEXTS["usable"]["inconclusive"]
         return
-    names, uses = names_of(record), uses_of(record)
+    uses = uses_of(record)
     for kind, words in TEXTS["uses"].items():
         because: dict[str, list[str]] = {}
-        for stem, use in uses.items():
-            if use.kind == kind:
-                because.setdefault(use.brief or use.why, []).append(stem)
+        for stem in (stem for stem, use in uses.items() if use.kind == kind):
+            because.setdefault(uses[stem].brief or uses[stem].why, []).append(stem)
         if len(because) > _MOST_REASONS:
             stems = [stem for of in because.values() for stem in of]
             because = {"reasons below, under What was recorded": stems}
-        parts = [f"{_listed(of, names)}{f' ({why})' if why else ''}" for why, of in because.items()]
+        parts = [
+            f"{_listed(of, record)}{f' ({why})' if why else ''}" for why, of in because.items()
+        ]
         if parts:
             yield f"{words['long']}: {'; '.join(parts)}."
 
 
-def _listed(stems: Sequence[str], names: dict[str, str]) -> str:
+def _listed(stems: Sequence[str], record: ParticipantRecord) -> str:
+    names, items = names_of(record), []
     if len(stems) == len(names):
         return "all recordings"
-    items: list[str] = []
     for task in dict.fromkeys(map(task_of, stems)):
         of = [names[stem] for stem in stems if task_of(stem) == task]
         items += [f"{len(of)} × {task}"] if len(of) > _MOST_RUNS else of
@@ -273,28 +284,26 @@ def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     return {trial.stem: _use_of(record, trial, causes) for trial in record.trials}
 
 
-def _use_of(
-    record: ParticipantRecord, trial: TrialRecord, causes: dict[int, tuple[Candidate, ...]]
-) -> Use:
+def _use_of(record: ParticipantRecord, trial: TrialRecord, causes: Mapping[int, Cause]) -> Use:
     """By the worst of its markers, its forces and the findings that concern it; ``causes``: all
     findings of the diagnosis by their numbers."""
     if trial.kinematics is None or trial.kinematics.empty:
         return Use("out", "no motion was computed")
     found = {k: cause for k, cause in causes.items() if _concerns(cause, trial)}
-    large = sorted(_large(_of_each(record)[trial.stem]), key=lambda pair: -pair[1] / pair[0].limit)
+    families = {k: {EFFECT_WORDS[one.effect].family for one in of} for k, of in found.items()}
+    every = _of_each(record)[trial.stem]
+    large = sorted(_large(every), key=lambda pair: -pair[1] / pair[0].limit)
     sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
     if MARKERS in sizes:
         return Use("out", listing([*sizes.values()]), sizes[MARKERS])
     unexplained = findings([k for k, cause in found.items() if is_large(cause)])
-    moved = findings([k for k, cause in found.items() if _families(cause) <= _OF_THE_MOTION])
+    moved = findings([k for k, of in families.items() if of <= _OF_THE_MOTION])
     if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
         after = f"after {moved}" if moved else ""
         return Use("motion", "; ".join(filter(None, (listing(wrong), after))), after or wrong[0])
-    if not any(
-        np.isfinite(size) for one, size in _of_each(record)[trial.stem] if one.name != MARKERS
-    ):
+    if not any(np.isfinite(size) for one, size in every.items() if one.name != MARKERS):
         return Use("motion", "forces could not be compared")
-    correct = findings([k for k, c in found.items() if not _families(c) <= _IN_THE_MODEL])
+    correct = findings([k for k, of in families.items() if not of <= _IN_THE_MODEL])
     if correct:
         return Use("corrected", correct)
     return Use("care" if found else "full", findings([*found]))
@@ -306,5 +315,54 @@ def _concerns(cause: Sequence[Candidate], trial: TrialRecord) -> bool:
     return is_of_all or any(trial.stem in one.trials for one in cause)
 
 
-def _families(cause: Sequence[Candidate]) -> set[str]:
-    return {EFFECT_WORDS[one.effect].family for one in cause}
+# --- what an error looks like over time, from which follows what to check first -------------------
+
+_MOST = 0.5  # of the squared error: what makes as much sets the kind
+_PART = 0.25  # of the frames, in which an even error has as little
+_BRIEF_S = 0.2  # to either side of the worst moment
+
+
+@dataclass(frozen=True)
+class Shape:
+    """``kind`` : shifted (a centre of pressure, by a constant), constant (of a force), load (goes
+    along with it), brief, impact (the force changes fast), light (there is little load) or mixed.
+    ``column`` : of the signals, the one with most of the error. ``worst_s`` : when it is largest [s].
+    """
+
+    kind: str
+    column: str
+    worst_s: float
+
+
+def shape_of(
+    reconstruction: pd.DataFrame | None, method: str, columns: Sequence[str]
+) -> Shape | None:
+    """Of the method's signals (centre of pressure [m] or force [N]) less the measured ones; None if
+    not known."""
+    if reconstruction is None or method not in set(reconstruction["method"]):
+        return None
+    signals = {name: signals_of(reconstruction, name) for name in (*columns, "fz_N")}
+    clock, load = clock_of(reconstruction), signals["fz_N"][MEASURED]
+    off = np.array([signals[name][method] - signals[name][MEASURED] for name in columns])
+    known = flags_of(reconstruction, "valid") & np.isfinite([*off, load]).all(axis=0)
+    if not off[:, known].any():
+        return None
+    clock, load, off = clock[known], load[known], off[:, known]
+    power, is_load = (off**2).sum(axis=0), "fz_N" in columns  # of the load itself, or under it
+    worst_s = float(clock[np.argmax(power)])
+    near = np.abs(clock - worst_s) <= _BRIEF_S
+    speed = np.abs(np.gradient(load, clock)) if len(load) > 1 else np.zeros_like(load)
+    frames = {
+        "brief": near & (near.mean() <= _PART),
+        "impact": speed > np.quantile(speed, 1.0 - _PART),
+        "light": (load < np.quantile(load, _PART)) & (not is_load),
+    }
+    mean = float((off.mean(axis=1) ** 2).sum() / power.mean())
+    shares = {"constant" if is_load else "shifted": mean}
+    if is_load:
+        along = load - load.mean()
+        shares["load"] = float((off[0] @ along) ** 2 / ((along @ along) * power.sum() or np.inf))
+    shares |= {kind: float(power[of].sum() / power.sum()) for kind, of in frames.items()}
+    kind = max(shares, key=shares.__getitem__)
+    kind = kind if shares[kind] >= _MOST else "mixed"
+    return Shape(kind, columns[int(np.argmax((off**2).sum(axis=1)))], worst_s)

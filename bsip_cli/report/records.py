@@ -14,7 +14,7 @@ import pandas as pd
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Terms, first_of
-from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
+from bsip_cli.report.causes import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
 from bsip_cli.statistics.methods import MEASURED, RM, is_extended
 
@@ -121,14 +121,10 @@ class ParticipantRecord:
     def use(self, movement: str = "all") -> str:
         """The method whose parameters are to be used, in one movement or mostly; the table's where
         nothing was chosen."""
-        chosen = self._chosen
-        return chosen.get(movement, next(iter(chosen.values()), RM))
-
-    @cached_property
-    def _chosen(self) -> dict[str, str]:
-        """By movement."""
-        table = self.choice
-        return {} if table is None else dict(zip(table["movement"], table["use"], strict=True))
+        if self.choice is None or self.choice.empty:
+            return RM
+        chosen = dict(zip(self.choice["movement"], self.choice["use"], strict=True))
+        return str(chosen.get(movement, self.choice["use"].iloc[0]))
 
     def use_words(self) -> str:
         """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""
@@ -213,27 +209,26 @@ class HowMade:
         return float(next(iter(self.options.get(option, ())), otherwise))
 
 
-def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
+def how_made(made: HowMade, defaults: Mapping[str, Any]) -> Iterator[Block]:
     """Warnings, versions, options that differ from the shipped ones, and the recordings with the
     start of their hashes."""
     said = [
         f"{stage}{f' ({unit})' if unit else ''}: {labelled(text)}"
         for stage, unit, text in made.messages
     ]
-    blocks: list[Block] = [Heading("Warnings")]
+    yield Heading("Warnings")
     nothing = (Paragraph("No stage had anything to warn of."),)
-    blocks += first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
+    yield from first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
     shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
+    yield Heading("Options that differ from the shipped ones")
     differ = Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items())))
-    blocks += [Heading("Options that differ from the shipped ones")]
-    blocks += [differ if changed else Paragraph("None.")]
+    yield differ if changed else Paragraph("None.")
     versions = (f"{name} {' / '.join(sorted(v))}" for name, v in sorted(made.versions.items()))
-    blocks += [Heading("Versions"), Paragraph(", ".join(versions))]
+    yield from (Heading("Versions"), Paragraph(", ".join(versions)))
     if made.files:
         rows = tuple((name, made.files[name][:_HASH_DIGITS]) for name in sorted(made.files))
-        blocks.append(Grid(("file read", "SHA-256 (start)"), rows, words=2))
-    return blocks
+        yield Grid(("file read", "SHA-256 (start)"), rows, words=2)
 
 
 def flat(options: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:

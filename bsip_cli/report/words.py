@@ -6,13 +6,22 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import OM
 
-TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEXTS, _SENTENCES = (
+    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    for name in ("texts.toml", "sentences.toml")
+)
 MISSING = "–"
+_NEARLY_SURE = 1e-3  # probabilities this near to 0 or 1 are not given in digits
 EXTENDED = f"{OM}+causes"  # how reports call OM with every named cause in the model
 METHODS: dict[str, str] = TEXTS["methods"]
 COMPONENTS: dict[str, str] = TEXTS["components"]
@@ -66,6 +75,15 @@ def listing(items: Sequence[str], empty: str = "none") -> str:
     if not items:
         return empty
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def probability_words(probability: float) -> str:
+    """``99.5 %`` or ``over 99.9 %``; empty where there is none."""
+    if math.isnan(probability):
+        return ""
+    if probability > 1 - _NEARLY_SURE:
+        return "over 99.9 %"
+    return f"{number(100 * probability, 1)} %" if probability >= _NEARLY_SURE else "under 0.1 %"
 
 
 def findings(numbers: Sequence[int]) -> str:
@@ -134,3 +152,21 @@ def component_label(component: str) -> str:
 def method_rank(method: str) -> tuple[int, str]:
     """By which methods are sorted: measured first, those without a label last."""
     return (list(METHODS).index(method) if method in METHODS else len(METHODS)), method
+
+
+def say(name: str, **known: Any) -> str:
+    """The sentence of ``sentences.toml`` by that name, of what is known."""
+    return _sentences().get_template(name).render(known)
+
+
+@cache
+def _sentences() -> Environment:
+    """With the functions above as filters."""
+    from jinja2 import DictLoader, Environment, StrictUndefined  # heavy
+
+    made = Environment(loader=DictLoader(_SENTENCES), undefined=StrictUndefined)
+    numbers = number, signed, percent, probability_words
+    for one in (*numbers, listing, capital, component_label):
+        made.filters[one.__name__] = one
+    made.filters["segment_label"] = segment_label
+    return made

@@ -24,8 +24,8 @@ from bsip_cli.diagnosis.shared_faults import with_known
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
-from bsip_cli.report.budget_words import term_words
-from bsip_cli.report.candidates import candidates_of, causes_of
+from bsip_cli.report.budget import term_words
+from bsip_cli.report.causes import candidates_of, causes_of
 from bsip_cli.report.verdict import cause_line, verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import Diagnosed, diagnosed, weighed

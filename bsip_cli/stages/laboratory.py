@@ -24,7 +24,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, Number, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.scene import Scene
-from bsip_cli.report.cohort.laboratory import named_sentences
+from bsip_cli.report.cohort import named_sentences
 from bsip_cli.report.words import count
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, prior_of, stated_sd

@@ -11,10 +11,10 @@ from typing import Any
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
+from bsip_cli.report import cohort_record as cohort
 from bsip_cli.report import records
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
-from bsip_cli.report.cohort import record as cohort
-from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.participant import participant_document
 from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
@@ -138,7 +138,7 @@ def origin_of(path: Path, label: str) -> records.Origin:
 
 def run_group(unit: Unit) -> None:
     """Read all of the study; write the page, its figures and their numbers."""
-    from bsip_cli.report.cohort.document import cohort_document  # heavy
+    from bsip_cli.report.cohort import cohort_document  # heavy
 
     document = cohort_document(cohort_record_of(unit))
     unit.write("group-report-files", file_rows(unit.out, write_page(unit, document)))

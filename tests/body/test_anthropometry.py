@@ -185,7 +185,8 @@ def test_centres_are_told_along_limbs_alone():
     told = np.argwhere(np.isfinite(com))
     along = {ROWS[i]: int(axis) for i, axis in told}
     assert along == dict.fromkeys(ROWS[2:], 1) | {"foot": 0}
-    assert np.nanmax(com) < 4
+    assert com[ROWS.index("arm"), 1] == pytest.approx(np.hypot(1.0, 7.7))  # people and tables
+    assert np.nanmax(com) < 8
 
 
 def test_the_sample_s_mean_person_has_what_people_and_tables_stray_by():

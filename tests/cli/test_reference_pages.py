@@ -11,7 +11,7 @@ import pytest
 from bsip_cli.cli import cli
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.reference import REGENERATE, OptionText, option_texts, pages, write_pages
-from bsip_cli.report.effect_words import EFFECT_WORDS, usual_words
+from bsip_cli.report.causes import EFFECT_WORDS, usual_words
 from bsip_cli.schemas import SCHEMAS
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -9,10 +9,20 @@ import pytest
 
 from bsip_cli.artifacts import read_header
 from bsip_cli.report.tables.build import IN_PRINT, NAMES, build_tables, show
-from bsip_cli.report.tables.formats import escape_latex as latex
-from bsip_cli.report.tables.formats import escape_markdown as markdown
-from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
-from bsip_cli.report.tables.model import Column, Row, Table, interval, mean_sd, number, p_value
+from bsip_cli.report.tables.model import (
+    Column,
+    Row,
+    Table,
+    interval,
+    mean_sd,
+    number,
+    p_value,
+    to_csv,
+    to_latex,
+    to_markdown,
+)
+from bsip_cli.report.tables.model import escape_latex as latex
+from bsip_cli.report.tables.model import escape_markdown as markdown
 from bsip_cli.report.tables.published import comparison_name
 from bsip_cli.statistics.cohort import Criteria
 
@@ -23,7 +33,7 @@ NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"
 def small_table(label: str = "a", unit: str = "kg") -> Table:
     columns = (
         Column(("name",), "Name", text=True),
-        Column(("mean", "sd"), "M(SD)", mean_sd(2), in_row_unit=True),
+        Column(("mean", "sd"), "M(SD)", mean_sd, in_row_unit=True),
         Column(("p",), "p", p_value),
         Column(("hidden",)),
     )
@@ -113,12 +123,12 @@ def test_p_values(p, printed):
 
 
 def test_numbers():
-    assert number(2)(-0.004) == "0.00"
-    assert number(2)(-12.3461) == "-12.35"
-    assert mean_sd(2)(8.788, 1.1) == "8.79(1.10)"
-    assert mean_sd(2)(36123.4, 2799.6) == "36123(2800)"
-    assert interval(2)(-0.104, 0.01) == "[-0.10, 0.01]"
-    assert interval(2)(nan, nan) == "-"
+    assert number(-0.004) == "0.00"
+    assert number(-12.3461) == "-12.35"
+    assert mean_sd(8.788, 1.1) == "8.79(1.10)"
+    assert mean_sd(36123.4, 2799.6) == "36123(2800)"
+    assert interval(-0.104, 0.01) == "[-0.10, 0.01]"
+    assert interval(nan, nan) == "-"
 
 
 def rows_of(text: str) -> list[list[str]]:

@@ -127,28 +127,24 @@ def test_the_spread_of_a_person_is_found():
         measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])
         fit = fit_with_weights(terms_of(problem_of(rows, measured, 1.0)))
         spreads.append(1 / np.sqrt(fit.spread))
-    assert spreads[0][1] < 0.7
-    assert spreads[1][1] == pytest.approx(1.0)  # never wider than said
-    assert spreads[0][0] < 0.8  # the masses, of which the data say little
+    assert spreads[0][0] < 0.7
+    assert spreads[1][0] == pytest.approx(1.0)  # never wider than said
 
 
 def test_the_spreads_have_the_largest_evidence():
-    """Nothing said beforehand: no spread of masses or centres twice or half as wide is likelier."""
+    """Nothing said beforehand: no spread of centres twice or half as wide is likelier."""
     rows = regressor()
     rng = np.random.default_rng(8)
     true = parameters(drawn(np.array([1.0, 1.0, 1.0, 1.0, *[0.3] * 6]), rng))
     measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])
     problem = replace(problem_of(rows, measured, 1.0), spread_weight=1e-3)
     terms = terms_of(problem)
-    tensors = sum(terms.spreads[2:], terms.fixed)  # as said
-    terms = replace(terms, spreads=terms.spreads[:2], fixed=tensors)
+    tensors = sum(terms.spreads[1:], terms.fixed)  # as said
+    terms = replace(terms, spreads=terms.spreads[:1], fixed=tensors)
     fit = fit_with_weights(terms)
-    for k in (0, 1):
-        for factor in (0.25, 4.0):
-            spread = fit.spread.copy()
-            spread[k] *= factor
-            other = fit_at(terms, spread, fit.gamma)
-            assert other.evidence < fit.evidence
+    for factor in (0.25, 4.0):
+        other = fit_at(terms, factor * fit.spread, fit.gamma)
+        assert other.evidence < fit.evidence
     for gamma in (0.03, 0.3, 3.0):
         other = fit_at(terms, fit.spread, gamma)
         assert other.evidence <= fit.evidence + 1e-9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,15 +44,17 @@ def frame(columns: str, *rows: tuple) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=columns.split())
 
 
+def filled(kind: str, table: pd.DataFrame) -> pd.DataFrame:
+    """With all columns of an artifact; what the table does not say is empty."""
+    nothing = {"float": np.nan, "int": 0, "bool": False, "text": ""}
+    known = {c.name: nothing[c.type] for c in SCHEMAS[kind].columns if "*" not in c.name}
+    return table.assign(**{name: x for name, x in known.items() if name not in table})
+
+
 def participant(name: str = "sub-01") -> Participant:
+    runs = {task: "" if task == "static" else "_run-1" for task in TASKS}
     trials = tuple(
-        Trial(
-            name,
-            task,
-            f"{name}_task-{task}" + ("_run-1" if task != "static" else ""),
-            Path(f"{name}_task-{task}.c3d"),
-            role,
-        )
+        Trial(name, task, f"{name}_task-{task}{runs[task]}", Path(f"{name}_task-{task}.c3d"), role)
         for task, role in TASKS.items()
     )
     return Participant(name, "M", MASS_KG, 1.63, trials)
@@ -105,19 +108,22 @@ class Artifacts:
         return self
 
     def write_trial(self, trial: Trial) -> None:
-        self.write("quality", quality(), trial)
-        self.write("kinematics", self.kinematics(trial), trial)
-        self.write("marker-residuals", self.residuals(trial), trial)
-        self.write("marker-events", marker_events(), trial)
-        self.write("reconstruction", self.reconstruction(trial), trial)
-        self.write("fit", self.fit(trial), trial)
+        tables = {
+            "quality": quality(),
+            "kinematics": self.kinematics(trial),
+            "marker-residuals": self.residuals(trial),
+            "marker-events": marker_events(),
+            "reconstruction": self.reconstruction(trial),
+            "fit": self.fit(trial),
+            "posturography": posturography(),
+            "correlation-difference": empty_table("correlation-difference"),
+        }
         if trial.task != "static":
             moments = self.joint_moments(trial)
-            self.write("joint-moments", moments, trial)
-            self.write("joint-peaks", peaks_of(moments, MASS_KG, LEFT_OUT), trial)
-        self.write("posturography", posturography(), trial)
-        nothing = empty_table("correlation-difference")
-        self.write("correlation-difference", nothing, trial)
+            tables |= {"joint-moments": moments}
+            tables |= {"joint-peaks": peaks_of(moments, MASS_KG, LEFT_OUT)}
+        for kind, table in tables.items():
+            self.write(kind, table, trial)
 
     # --- participant ------------------------------------------------------------------------
 
@@ -149,22 +155,15 @@ class Artifacts:
         return pd.concat(tables, ignore_index=True)
 
     def identification(self) -> pd.DataFrame:
-        row = {
-            "trials": self.person.trials[1].stem,
-            "samples": 1400,
-            "duration_s": 13.5,
-            "effective_samples": 321.0,
-            "rank": 128,
-            "condition_number": 812.0,
-            "mass_factor": MASS_FACTOR,
-            "mass_factor_sd": 0.002,
-        }
-        row |= {"distance": 9.0, "probability": 0.4, "rare": False, "farthest": "the head"}
-        row |= {f"rms_{c}_N": 4.5 for c in ("fx", "fy", "fz")}
-        row |= {f"rms_{c}_Nm": 2.25 for c in ("mx", "my", "mz")}
-        one_number = {"estimator": "mass_factor", "method": RM_MASS, "note": "times 0.96"}
-        own = {"estimator": "hansen2017", "method": OM, "note": "masses kept positive"}
-        return pd.DataFrame([one_number | row, own | row])
+        table = frame(
+            "estimator method note",
+            ("mass_factor", RM_MASS, "times 0.96"),
+            ("hansen2017", OM, "masses kept positive"),
+        )
+        known = {"trials": self.person.trials[1].stem, "duration_s": 13.5, "samples": 1400}
+        known |= {"condition_number": 812.0, "mass_factor": MASS_FACTOR, "mass_factor_sd": 0.002}
+        known |= {"rare": False, "farthest": "the head", "rank": 128}
+        return filled("identification", table.assign(**known))
 
     # --- trial ------------------------------------------------------------------------------
 
@@ -247,12 +246,8 @@ class Artifacts:
         sizes = {RM: 1.0, OM: 1.1, "OM+plate_rotation": 1.2}
         parts = [
             pd.DataFrame({"time_s": t, "method": method, "joint": joint, "axis": axis}).assign(
-                force_N=0.0,
-                force_sd_N=1.0,
                 moment_Nm=np.where(valid, size * top * np.sin(2 * np.pi * t / 2.5), np.nan),
                 moment_sd_Nm=2.0,
-                power_W=0.0,
-                power_sd_W=1.0,
                 valid=valid,
             )
             for method, size in sizes.items()
@@ -262,7 +257,7 @@ class Artifacts:
             )
             for axis in axes
         ]
-        return pd.concat(parts, ignore_index=True)
+        return filled("joint-moments", pd.concat(parts, ignore_index=True))
 
     def fit(self, trial: Trial) -> pd.DataFrame:
         rows = []
@@ -326,11 +321,9 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
 
 
 def marker_events() -> pd.DataFrame:
-    said = [f"RKNEL slips 15 mm on {EVIL}"] * 2
-    return frame(
-        "kind marker partner start_s end_s size_m statistic sentence what when put_right",
-        ("slip", "RKNEL", "", 1.0, 2.0, 0.015, 9.0, *said, "", False),
-    )
+    said = f"RKNEL slips 15 mm on {EVIL}"
+    row = ("slip", "RKNEL", said, said)
+    return filled("marker-events", frame("kind marker sentence what", row))
 
 
 def posturography() -> pd.DataFrame:
@@ -346,39 +339,33 @@ def diagnosis(trials: list[str]) -> pd.DataFrame:
     """A turned plate (named), a group of two in the last trial, and a rejected wobbling mass."""
     everywhere, last = ", ".join(trials), trials[-1]
     turned = "plate 1 is turned by +2.0 degrees"
-    return frame(
-        "rank effect target parameter estimate unit ci_low ci_high p_value gain_percent "
-        "gain_ci_low gain_ci_high verdict class_id sentence trials probability scope rms_change "
-        "persons own_estimate own_low own_high what short against remark is_signed",
-        _cause(1, "plate_rotation", "1", "yaw", 0.035, "rad", "named", "", turned, everywhere),
-        _cause(1, "plate_rotation", "1", "tilt", 0.0, "rad", "named", "", turned, everywhere),
-        _cause(
-            2, "plate_zero", "1 fz", "offset", 9.8, "N", "ambiguous", "B",
-            "channel fz has an offset of +9.8 N", last,
-        ),
-        _cause(
-            3, "added_mass", "hand_l", "mass", 1.0, "kg", "ambiguous", "B",
-            "1.00 kg more move with the left hand", last,
-        ),
-        _cause(
-            4, "wobbling_mass", "thigh_l", "mass", 0.3, "kg", "rejected", "",
-            f"0.3 kg swing on {EVIL}", last,
-        ),
+    table = frame(
+        "rank effect target parameter estimate unit verdict class_id what trials probability scope",
+        (1, "plate_rotation", "1", "yaw", 0.035, "rad", "named", "", turned, everywhere, 0.995,
+         "laboratory"),
+        (1, "plate_rotation", "1", "tilt", 0.0, "rad", "named", "", turned, everywhere, 0.995,
+         "laboratory"),
+        (2, "plate_zero", "1 fz", "offset", 9.8, "N", "ambiguous", "B",
+         "channel fz has an offset of +9.8 N", last, 0.58, "laboratory"),
+        (3, "added_mass", "hand_l", "mass", 1.0, "kg", "ambiguous", "B",
+         "1.00 kg more move with the left hand", last, 0.38, "person"),
+        (4, "wobbling_mass", "thigh_l", "mass", 0.3, "kg", "rejected", "",
+         f"0.3 kg swing on {EVIL}", last, 0.04, "person"),
     )  # fmt: skip
-
-
-def _cause(
-    rank, effect, target, parameter, estimate, unit, verdict, class_id, what, trials
-) -> tuple:
-    probability = {1: 0.995, 2: 0.58, 3: 0.38, 4: 0.04}[rank]
-    ends = (0.9 * estimate - 0.001, 1.1 * estimate + 0.001)
-    low, high = ends if verdict != "rejected" else (np.nan, np.nan)
-    gain = 8.0 / rank if rank < 3 else np.nan
-    scope = {"plate": "laboratory", "added": "person", "wobbling": "person"}
-    found = (rank, effect, target, parameter, estimate, unit, low, high, 1 - probability)
-    said = (gain, gain / 2, 1.5 * gain, verdict, class_id, f"{what}; pray", trials)
-    more = (probability, scope[effect.split("_")[0]], 12.0 / rank, 0, *[np.nan] * 3)
-    return (*found, *said, *more, what, "", "", "", True)
+    gain = (8.0 / table["rank"]).where(table["rank"] < 3)
+    found = table["verdict"] != "rejected"
+    more = table.assign(
+        ci_low=(0.9 * table["estimate"] - 0.001).where(found),
+        ci_high=(1.1 * table["estimate"] + 0.001).where(found),
+        p_value=1 - table["probability"],
+        rms_change=12.0 / table["rank"],
+        sentence=table["what"] + "; pray",
+        is_signed=True,
+        gain_percent=gain,
+        gain_ci_low=gain / 2,
+        gain_ci_high=1.5 * gain,
+    )
+    return filled("diagnosis", more)
 
 
 def error_budget(trials: list[str]) -> pd.DataFrame:
@@ -391,19 +378,18 @@ def error_budget(trials: list[str]) -> pd.DataFrame:
         "noise": (3.0, ""),
         "total": (100.0, ""),
     }
-    columns = (
-        "term target component rms unit share_percent share_low share_high gain_percent gain_low "
-        "gain_high data trial scale alike"
-    )
-    rows = []
-    for trial in ("", *trials):
-        for component, unit in (("fz", "N"), ("cop_ap", "mm"), ("cop_ml", "mm")):
-            for term, (share, alike) in shares.items():
-                size = (20.0 * abs(share) / 100, unit, share, share - 5.0, share + 5.0)
-                gain: tuple = (np.nan, np.nan, np.nan, "")
-                gain = (40.0, 30.0, 50.0, "each trial from the others") if term == "total" else gain
-                rows.append((term, "", component, *size, *gain, trial, 1.0, alike))
-    return frame(columns, *rows)
+    rows = [
+        (trial, component, unit, term, share, alike)
+        for trial in ("", *trials)
+        for component, unit in (("fz", "N"), ("cop_ap", "mm"), ("cop_ml", "mm"))
+        for term, (share, alike) in shares.items()
+    ]
+    table = frame("trial component unit term share_percent alike", *rows)
+    is_total, share = table["term"] == "total", table["share_percent"]
+    gain = {"gain_percent": 40.0, "gain_low": 30.0, "gain_high": 50.0}
+    gains = {name: np.where(is_total, x, np.nan) for name, x in gain.items()}
+    table = table.assign(rms=0.2 * share.abs(), share_low=share - 5, share_high=share + 5, **gains)
+    return filled("error-budget", table)
 
 
 def detection(trials: list[str]) -> pd.DataFrame:
@@ -437,8 +423,7 @@ def changes() -> pd.DataFrame:
     """What a cause does to the parameters: much to a thigh, little to a foot."""
     columns = "segment mass_change_kg com_change_m"
     table = frame(columns, ("thigh_l", 1.2, 0.015), ("foot_r", 0.001, 0.0002))
-    shift = {f"com_{axis}_change_m": 0.0 for axis in "xyz"}
-    return table.assign(method="OM+plate_rotation", **shift, largest="", sentence="")
+    return filled("bsip-change", table.assign(method="OM+plate_rotation"))
 
 
 def svgs(html: str) -> list[bytes]:
@@ -450,3 +435,9 @@ def svgs(html: str) -> list[bytes]:
 def pictures_of(document: Document) -> list[Picture]:
     """All of a report."""
     return [block for block in document.blocks() if isinstance(block, Picture)]
+
+
+def words_of(html: str) -> str:
+    """What a reader sees, with plain spaces."""
+    bare = re.sub(r"<style.*?</style>", " ", html, flags=re.S)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", bare)))

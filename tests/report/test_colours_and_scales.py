@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from bsip_cli.report import cause_colours
 from bsip_cli.report.blocks import Bar, Document, Scales, render
-from bsip_cli.report.budget_words import overall_pieces
-from bsip_cli.report.cause_colours import COLOURS, FAULT, Piece, fills
+from bsip_cli.report.budget import COLOURS, FAULT, HATCHES, Piece, fills, overall_pieces
 from bsip_cli.report.errors import yardsticks
 from bsip_cli.report.words import abbreviations
 from tests.report.fake_study import error_budget
@@ -36,7 +34,7 @@ def test_faults_share_their_colour_and_differ_by_their_hatching():
     faults = [Piece(name, 25.0, (FAULT,)) for name in "abcd"]
     found = fills(faults)
     assert {one.colours for one in found.values()} == {(COLOURS[FAULT],)}
-    assert len({one.css() for one in found.values()}) == len(cause_colours.HATCHES)
+    assert len({one.css() for one in found.values()}) == len(HATCHES)
 
 
 def test_pieces_know_their_kinds():
@@ -51,11 +49,10 @@ def test_pieces_know_their_kinds():
 @pytest.mark.parametrize(("value", "part", "beyond"), [(15.0, 0.25, False), (90.0, 1.0, True)])
 def test_scales_end_at_a_fixed_size(value, part, beyond):
     first, *others = yardsticks(0.03, 5.0)
-    scale = first.scale(value)
-    assert (scale.part, scale.is_beyond, scale.limit_part) == (part, beyond, 0.5)
-    assert {one.scale(one.limit).part for one in others} == {0.5}
-    assert ('class="arrow"' in page_of(Scales((scale,)))) == beyond
-    assert first.scale(np.nan).part == 0.0
+    assert first.part(value) == part and first.marks[1][0] == 0.5
+    assert {one.part(one.limit) for one in others} == {0.5}
+    assert ('class="arrow"' in page_of(Scales(((first, value, None),)))) == beyond
+    assert first.part(np.nan) == 0.0
 
 
 def test_abbreviations_of_tasks_are_spelled_out():

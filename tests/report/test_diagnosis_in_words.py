@@ -8,23 +8,27 @@ from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.nameless import ALONG
 from bsip_cli.report.blocks import Paragraph
-from bsip_cli.report.budget_words import (
+from bsip_cli.report.budget import (
     budget_sentences,
     found_share,
     numbered_pieces,
     overall_pieces,
     pieces,
 )
-from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
-from bsip_cli.report.effect_words import (
+from bsip_cli.report.causes import (
     EFFECT_WORDS,
+    UNNAMED,
     USUAL,
+    candidates_of,
+    causes_of,
     check_for,
+    limits_of,
+    limits_sentence,
     place_label,
     separating_recording,
     size_words,
 )
-from bsip_cli.report.participant.document import limit_blocks, nearest
+from bsip_cli.report.participant import limit_blocks, nearest
 from bsip_cli.report.verdict import (
     Verdict,
     cause_line,
@@ -32,9 +36,9 @@ from bsip_cli.report.verdict import (
     change_sentence,
     gain_sentence,
     light_of,
-    probability_words,
     verdict_of,
 )
+from bsip_cli.report.words import probability_words
 from tests.report.fake_study import changes, detection, diagnosis, error_budget, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]

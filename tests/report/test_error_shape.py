@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.error_shape import shape_of
+from bsip_cli.report.recordings import shape_of
 from bsip_cli.report.words import TEXTS
 
 TIMES_S = np.arange(0.0, 10.0, 0.01)

@@ -20,7 +20,6 @@ def pose() -> Pose:
         bones_m=rng.uniform(0.2, 1.6, (2, 2, 3)),
         sides=("l", ""),
         head_m=np.array([0.1, 0.2, 1.7]),
-        head_radius_m=0.1,
         markers_m=rng.uniform(0.2, 1.6, (4, 3)),
         force_at_m=np.full(3, 0.05),
         force_N=np.array([0.0, 0.0, 700.0]),

@@ -4,7 +4,6 @@ import hashlib
 import re
 from dataclasses import replace
 from datetime import date
-from html import unescape
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,13 +13,13 @@ import pytest
 from bsip_cli.report.blocks import Light, Links, Numbered, Picture
 from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.first_page import front, who
-from bsip_cli.report.participant import errors
-from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.joints import joint_blocks
+from bsip_cli.report.participant import participant_document
 from bsip_cli.report.recordings import large_finding, light_for
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
 from bsip_cli.report.words import number, with_spread
-from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs
+from tests.report.fake_study import EVIL, MASS_KG, pictures_of, svgs, words_of
 
 FILE = "sub-01_task-static.c3d"
 TITLES = (
@@ -37,12 +36,6 @@ TITLES = (
 @pytest.fixture(scope="module")
 def page(reports) -> str:
     return reports.html("sub-01")
-
-
-def words_of(html: str) -> str:
-    """What a reader sees, with plain spaces."""
-    bare = re.sub(r"<style.*?</style>", " ", html, flags=re.S)
-    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", bare)))
 
 
 @pytest.fixture(scope="module")
@@ -312,12 +305,12 @@ def test_arms_are_shown_where_no_leg_is_known(record):
         replace(t, joint_moments=armed(t.joint_moments), joint_peaks=armed(t.joint_peaks))
         for t in record.trials[1:]
     )
-    section = errors.joints_section(replace(record, trials=trials))
-    (picture,) = [block for block in section.blocks if isinstance(block, Picture)]
+    section = tuple(joint_blocks(replace(record, trials=trials)))
+    (picture,) = [block for block in section if isinstance(block, Picture)]
     assert set(picture.data["joint"]) == {"elbow_r"}
     assert set(picture.data["method"]) == {"RM", "OM", "OM+plate_rotation"}
     bare = tuple(replace(t, joint_moments=None, joint_peaks=None) for t in record.trials)
-    (said,) = errors.joints_section(replace(record, trials=bare)).blocks
+    (said,) = joint_blocks(replace(record, trials=bare))
     assert "bsip joints" in said.text
 
 

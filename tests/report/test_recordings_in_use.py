@@ -12,12 +12,11 @@ from bsip_cli.commands.show import shown
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.report.blocks import Links, Numbered, Scales
-from bsip_cli.report.budget_words import budget_sentences
-from bsip_cli.report.candidates import candidates_of, causes_of
-from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.budget import budget_sentences
+from bsip_cli.report.causes import candidates_of, causes_of, effect_title
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.first_page import budget_bar, front
-from bsip_cli.report.participant.errors import all_peaks, moment_change
+from bsip_cli.report.joints import all_peaks, moment_change
 from bsip_cli.report.recordings import (
     beyond,
     large_finding,
@@ -69,6 +68,22 @@ def with_error(record: ParticipantRecord, stem: str, **columns) -> ParticipantRe
 def with_trial(record: ParticipantRecord, stem: str, **tables) -> ParticipantRecord:
     trials = (replace(t, **tables) if t.stem == stem else t for t in record.trials)
     return replace(record, trials=tuple(trials))
+
+
+def far_off(record: ParticipantRecord, *faults: pd.DataFrame) -> ParticipantRecord:
+    """With these faults, and a large error of the vertical force in the throw."""
+    return with_error(with_faults(record, *faults), BASKETBALL, rmse_percent_bw=9.0)
+
+
+def steps(record: ParticipantRecord) -> tuple[str, ...]:
+    """What to do next."""
+    return front(record)[-1].items
+
+
+def lines(record: ParticipantRecord) -> tuple[str, ...]:
+    """The findings of the first page."""
+    (numbered,) = (block for block in front(record) if isinstance(block, Numbered))
+    return numbered.items
 
 
 def kinds_of(record: ParticipantRecord) -> list[str]:
@@ -154,10 +169,8 @@ def test_large_alone_is_in_the_title(record):
     far = with_error(with_faults(record), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(far).title == "Fine: no fault found, no large error except in sequence"
     assert large_finding(far) == ()
-    *_, to_do = front(replace(far, refusals=()))
-    assert len(to_do.items) == 1 and to_do.items[0].startswith(
-        "In sequence the vertical force error"
-    )
+    (step,) = steps(replace(far, refusals=()))
+    assert step.startswith("In sequence the vertical force error")
     both = with_error(with_faults(record, TURNED), SEQUENCE, rmse_percent_bw=9.0)
     assert light_for(both).title == (
         "1 finding: force plate turned or tilted; no large error except in sequence"
@@ -165,17 +178,15 @@ def test_large_alone_is_in_the_title(record):
 
 
 def test_a_large_error_comes_first_and_counts(record):
-    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    far = far_off(record, TURNED)
     (finding,) = large_finding(far)
     assert finding == (
         "Large error with OM (basketball: RM): vertical force 9.0 %, most in basketball; other "
         "findings explain part at most."
     )
-    (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
-    assert numbered.items[0] == finding and numbered.items[1].startswith("Force plate turned")
-    *_, to_do = front(far)
-    assert to_do.items[0].startswith("Finding 1: In basketball the vertical")
-    assert to_do.items[1].startswith("Finding 2: Correct the forces")
+    assert lines(far)[0] == finding and lines(far)[1].startswith("Force plate turned")
+    assert steps(far)[0].startswith("Finding 1: In basketball the vertical")
+    assert steps(far)[1].startswith("Finding 2: Correct the forces")
     assert [one.name for one, _ in beyond(far)] == [FORCE]
     assert worst_of(far, beyond(far)[0][0]).stem == BASKETBALL
 
@@ -197,35 +208,31 @@ def test_parameters_wait_for_the_recordings_that_they_are_from(record):
 
 
 def test_elsewhere_found_is_no_explanation(record):
-    far = with_error(
-        with_faults(record, TURNED.assign(trials=SEQUENCE)), BASKETBALL, rmse_percent_bw=9.0
-    )
+    far = far_off(record, TURNED.assign(trials=SEQUENCE))
     assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
 
 
 def test_a_fault_that_makes_the_largest_part_is_named(record):
     term = record.budget["term"].replace("inertial_parameters", "fault:plate_rotation")
-    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    far = far_off(record, TURNED)
     known = replace(far, budget=far.budget.assign(term=term))
     assert number_of_main_part(known) == 2
     assert large_finding(known)[0].endswith("; the largest part is finding 2.")
     table = replace(far, choice=record.choice.assign(use="RM"))  # whose part the light says
     assert "the table's segment parameters" in light_for(table).title
     assert "part" not in large_finding(table)[0]
-    *_, to_do = front(known)
-    assert to_do.items[0].startswith("Finding 2: Correct the forces")  # and no search for the cause
+    assert steps(known)[0].startswith("Finding 2: Correct the forces")  # no search for the cause
     assert number_of_main_part(far) == 0
 
 
 def test_what_makes_the_largest_part_in_a_recording_says_what_helps(record):
     """Of the recording's own budget, whatever the others are."""
-    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    far = far_off(record, TURNED)
 
     def first_to_do(term: str) -> str:
         mine = (far.budget["trial"] == BASKETBALL) & (far.budget["term"] == "inertial_parameters")
         budget = far.budget.assign(term=far.budget["term"].mask(mine, term), alike="")
-        *_, to_do = front(replace(far, budget=budget))
-        return to_do.items[0]
+        return steps(replace(far, budget=budget))[0]
 
     assert first_to_do("joint_centres") == (
         "Finding 1: In basketball, joint centres may make the largest part of the vertical force "
@@ -240,7 +247,7 @@ def test_what_makes_the_largest_part_in_a_recording_says_what_helps(record):
 
 def test_nothing_is_of_unknown_cause_whose_bar_has_no_unknown_part(record):
     """OM errs, and the table's parameters, which it should have corrected, make most."""
-    far = with_error(with_faults(record, TURNED), BASKETBALL, rmse_percent_bw=9.0)
+    far = far_off(record, TURNED)
     unknown = far.budget["term"] == "unknown"
     assert main_part(far) == (None, True) and large_finding(far)[0].endswith("part at most.")
     bent = far.budget["term"].mask(unknown, "trunk_and_shoulders")
@@ -252,8 +259,7 @@ def test_nothing_is_of_unknown_cause_whose_bar_has_no_unknown_part(record):
     turned = far.budget["term"].mask(unknown, "fault:plate_rotation")
     named = replace(far, budget=far.budget.assign(term=turned))
     assert large_finding(named)[0].endswith("table's parameters is finding 2.")
-    *_, to_do = front(named)  # which does not explain all: where to look stays
-    assert to_do.items[0].startswith("Finding 1: In basketball the vertical")
+    assert steps(named)[0].startswith("Finding 1: In basketball the")  # where to look stays
 
 
 def test_what_looks_like_a_fault_is_part_of_the_unknown_with_its_finding(record):
@@ -275,9 +281,9 @@ def test_the_parameters_for_now_have_the_full_dot(record):
 
     def cop_of(one: ParticipantRecord) -> float:
         (scales,) = (block for block in front(one) if isinstance(block, Scales))
-        return float(scales.scales[0].shown.split()[0])
+        return scales.scales[0][1]
 
-    fits = {name: dict(measured_of(waits, name)) for name in ("RM", "OM")}
+    fits = {name: measured_of(waits, name) for name in ("RM", "OM")}
     cop = {name: next(iter(sizes.values())) for name, sizes in fits.items()}
     assert cop["RM"] != pytest.approx(cop["OM"], abs=0.1)
     assert cop_of(waits) == pytest.approx(cop["RM"], abs=0.06)
@@ -295,14 +301,12 @@ def test_a_large_error_elsewhere_is_a_finding_of_its_own(record):
     error = fault("unexplained", SEQUENCE, target="", parameter="error").assign(
         short="21 N of the vertical force remain unexplained", against="large is 15 N and more"
     )
-    far = with_error(with_faults(record, error), BASKETBALL, rmse_percent_bw=9.0)
+    far = far_off(record, error)
     assert large_finding(far)[0].endswith("most in basketball; cause unknown.")
-    (numbered,) = (block for block in front(far) if isinstance(block, Numbered))
-    assert [line[:5] for line in numbered.items] == ["Large", "Error"]
+    assert [line[:5] for line in lines(far)] == ["Large", "Error"]
     there = with_faults(far, error.assign(trials=", ".join(TRIALS)))
     assert large_finding(there) == ()
-    *_, to_do = front(there)
-    assert to_do.items[0].startswith("Finding 1: In basketball the vertical")
+    assert steps(there)[0].startswith("Finding 1: In basketball the vertical")
 
 
 def test_markers_far_off_are_no_matter_of_the_forces(record):
@@ -313,8 +317,7 @@ def test_markers_far_off_are_no_matter_of_the_forces(record):
         "Large error with OM (basketball: RM): markers from model 25"
     )
     assert "explain" not in large_finding(lost)[0] and number_of_main_part(lost) == 0
-    *_, to_do = front(lost)
-    assert to_do.items[0].startswith("Finding 1: Check that marker set and labels are right")
+    assert steps(lost)[0].startswith("Finding 1: Check that marker set and labels are right")
 
 
 def test_the_terminal_numbers_findings_as_the_page_does(reports, tmp_path):
@@ -442,12 +445,12 @@ def test_the_own_size_goes_as_a_number_from_the_finding_to_the_candidate():
 
 
 def test_errors_by_other_parameters_stand_beside(record):
-    assert {one.name: size for one, size in measured_of(record, "RM")}[COP] > 0
+    assert {one.name: size for one, size in measured_of(record, "RM").items()}[COP] > 0
     everywhere = replace(record, choice=record.choice.query("movement == 'all'"))  # OM
     for used, differs in ((everywhere, True), (record, False)):  # in basketball RM, held out alone
         scales = next(block for block in front(used) if hasattr(block, "scales")).scales
-        assert [bool(scale.other) for scale in scales] == [differs, differs, False]
+        assert [other is not None for *_, other in scales] == [differs, differs, False]
     table = replace(record, choice=record.choice.assign(use="RM"))
     scales = next(block for block in front(table) if hasattr(block, "scales")).scales
-    assert not any(scale.other for scale in scales)
-    assert np.isfinite({one.name: size for one, size in measured_of(record)}[MARKERS])
+    assert all(other is None for *_, other in scales)
+    assert np.isfinite({one.name: size for one, size in measured_of(record).items()}[MARKERS])

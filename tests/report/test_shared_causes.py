@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid, Light
-from bsip_cli.report.cohort.document import diagnoses_section, light_of_all
-from bsip_cli.report.cohort.record import (
+from bsip_cli.report.cohort import diagnosis_blocks, light_of_all
+from bsip_cli.report.cohort_record import (
     CohortRecord,
     Member,
     Ratios,
@@ -70,7 +70,7 @@ def test_what_one_person_has_or_the_laboratory_tells_of_itself_is_not_shared():
     assert shared(ann=TURNED, bob=NOTHING) == ()
     known = TURNED.assign(persons=2)
     assert shared(ann=known, eve=known) == ()
-    blocks = diagnoses_section(cohort(ann=TURNED, eve=TURNED)).blocks
+    blocks = diagnosis_blocks(cohort(ann=TURNED, eve=TURNED))
     (said,) = (block for block in blocks if isinstance(block, Bullets))
     assert len(said.items) == 1
 
@@ -133,7 +133,7 @@ def cohort(**tables: pd.DataFrame | None) -> CohortRecord:
 
 
 def text_of(record: CohortRecord) -> str:
-    return " ".join(getattr(b, "text", "") for b in diagnoses_section(record).blocks)
+    return " ".join(getattr(b, "text", "") for b in diagnosis_blocks(record))
 
 
 def test_the_section_lists_causes_and_names_those_without():
@@ -142,7 +142,7 @@ def test_the_section_lists_causes_and_names_those_without():
     assert "No fault was found in bob (searched: sequence (run 1))." in text
     assert "Not searched for errors: eve." in text
     assert "No recording has motion with every contact on a plate: tom." in text
-    (grid,) = (b for b in diagnoses_section(record).blocks if isinstance(b, Grid))
+    (grid,) = (b for b in diagnosis_blocks(record) if isinstance(b, Grid))
     first, group = grid.cells()
     assert (first[0].text, first[0].link) == ("ann", "../ann/report.html")
     assert first[1].text.startswith("Plate 1 is turned by +2.0 degrees")
@@ -190,5 +190,5 @@ def test_what_a_probability_means_is_said_where_something_was_found():
 def test_a_person_without_report_has_no_link():
     record = cohort(ann=TURNED)
     record = replace(record, members=(replace(record.members[0], has_report=False),))
-    (grid,) = (b for b in diagnoses_section(record).blocks if isinstance(b, Grid))
+    (grid,) = (b for b in diagnosis_blocks(record) if isinstance(b, Grid))
     assert not grid.cells()[0][0].link

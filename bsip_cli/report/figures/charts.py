@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Bar
-from bsip_cli.report.cause_colours import NOISE, UNKNOWN, Fill, Piece, fills
+from bsip_cli.report.budget import NOISE, UNKNOWN, Fill, Piece, fills
 from bsip_cli.report.figures import canvas
 from bsip_cli.report.figures.canvas import BELOW_WITH_TITLE, MM, WIDTH, Axes, Figure
 from bsip_cli.statistics.methods import OM, RM, RM_MASS

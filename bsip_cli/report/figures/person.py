@@ -43,7 +43,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     floor += [[(x, y, 0.0) for x in ends] for y in steps]
     ground = projected(np.array(floor) + np.array([*centre[:2], pose.ground_m]), centre)
     bones, markers = projected(pose.bones_m, centre), projected(pose.markers_m, centre)
-    head, radius = projected(pose.head_m, centre), pose.head_radius_m
+    head, radius = projected(pose.head_m, centre), _HEAD_RADIUS_M
     arrow = projected(np.array([pose.force_at_m, pose.tip_m()]), centre)
     shown = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + radius]
     shown += [arrow] if np.isfinite(arrow).all() else []
@@ -92,7 +92,7 @@ class Pose:
     """Positions and force in the person's axes (anterior, right, up).
 
     bones_m : (b, 2, 3) end points; sides : (b,) ``l``, ``r`` or empty.
-    head_m : (3,) centre; head_radius_m : its radius. markers_m : (m, 3) as the model carries them.
+    head_m : (3,) centre of the head. markers_m : (m, 3) as the model carries them.
     force_at_m : (3,) where the ground force acts; force_N : (3,), NaN where it is not measured.
     ground_m : height of the ground. body_weight_N : what an arrow of half a body height stands for.
     """
@@ -101,7 +101,6 @@ class Pose:
     bones_m: np.ndarray
     sides: tuple[str, ...]
     head_m: np.ndarray
-    head_radius_m: float
     markers_m: np.ndarray
     force_at_m: np.ndarray
     force_N: np.ndarray
@@ -110,7 +109,7 @@ class Pose:
 
     def tip_m(self) -> np.ndarray:
         """(3,) tip of the force's arrow."""
-        top = float(self.head_m[2]) + self.head_radius_m - self.ground_m
+        top = float(self.head_m[2]) + _HEAD_RADIUS_M - self.ground_m
         return self.force_at_m + self.force_N * 0.5 * top / self.body_weight_N
 
     def reach_m(self) -> float:
@@ -143,11 +142,10 @@ def poses_of(
     x, y = anterior / np.linalg.norm(anterior)
     axes = np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])  # forward, to the right, up
     bones = _bones(body)
-    segments = np.array([i for i, _, _ in bones])
+    segments, starts, tips, sides = zip(*bones, strict=True)
     start, end = (
-        _points(R, p, segments, np.array([bone[k] for bone in bones])) @ axes.T for k in (1, 2)
+        _points(R, p, np.array(segments), np.array(ends)) @ axes.T for ends in (starts, tips)
     )
-    sides = tuple(_side(body, i, tip) for i, _, tip in bones)
     head = body.skeleton.index("head") if "head" in body.skeleton.segments else 0
     own = body.markers_in_joint_m()[body.marker_segments == head]
     centre = own.mean(axis=0) if len(own) else np.array([0.0, 0.15, 0.0])
@@ -160,7 +158,7 @@ def poses_of(
     ends = np.stack([start, end], axis=2)
     each = zip(times.tolist(), ends, heads, markers, point, force, strict=True)
     return tuple(
-        Pose(time_s, two, sides, centre, _HEAD_RADIUS_M, seen, at, measured, ground, body_weight_N)
+        Pose(time_s, two, sides, centre, seen, at, measured, ground, body_weight_N)
         for time_s, two, centre, seen, at, measured in each
     )
 
@@ -181,9 +179,9 @@ def _points(R: np.ndarray, p: np.ndarray, segments: np.ndarray, local: np.ndarra
     return p[:, segments] + np.einsum("nbij,bj->nbi", R[:, segments], local)
 
 
-def _bones(body: Person) -> list[tuple[int, np.ndarray, np.ndarray]]:
-    """Segment and end points, in the axes of its joint: from each joint to the next one; the last
-    segments of a limb end at their markers."""
+def _bones(body: Person) -> list[tuple[int, np.ndarray, np.ndarray, str]]:
+    """Segment, end points in the axes of its joint, and side: from each joint to the next one; the
+    last segments of a limb end at their markers."""
     skeleton, joints = body.skeleton, body.joint_positions_m()
     bones: list[tuple[int, np.ndarray, np.ndarray]] = []
     for i, name in enumerate(skeleton.segments):
@@ -193,14 +191,13 @@ def _bones(body: Person) -> list[tuple[int, np.ndarray, np.ndarray]]:
         bones += [(i, origin, joints[k]) for k in children if not np.allclose(joints[k], origin)]
         if not children and name != "head":
             bones += [(i, np.zeros(3), tip) for tip in _tips(body, i)]
-    return bones
-
-
-def _side(body: Person, segment: int, tip: np.ndarray) -> str:
-    side = body.skeleton.side(body.skeleton.segments[segment])
-    if side or abs(tip[2]) < 0.02:  # on the trunk, what leads sideways leads to a limb
-        return side
-    return "r" if tip[2] > 0.0 else "l"
+    sided = []
+    for i, start, tip in bones:
+        side = skeleton.side(skeleton.segments[i])
+        if not side and abs(tip[2]) >= 0.02:  # on the trunk, what leads sideways leads to a limb
+            side = "r" if tip[2] > 0.0 else "l"
+        sided.append((i, start, tip, side))
+    return sided
 
 
 def _tips(body: Person, segment: int) -> list[np.ndarray]:

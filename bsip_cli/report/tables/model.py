@@ -1,17 +1,22 @@
-"""A table as data, the tests of one table by what they are about, and numbers as the papers print
-them; a number that is not there is a dash."""
+"""A table as data and as text (CSV, LaTeX, Markdown), the tests of one table by what they are about,
+and numbers as the papers print them; a number that is not there is a dash."""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import groupby
 from math import isnan
 from pathlib import Path
 
-from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, all_reasons
+import pandas as pd
+
+from bsip_cli.report.words import segment_label
+from bsip_cli.statistics.cohort import Comparison, Topic, all_reasons
 from bsip_cli.statistics.methods import OM, RM
 
 Cell = str | float | int
@@ -37,19 +42,6 @@ class Column:
     in_row_unit: bool = False
     text: bool = False
     of: tuple[Number, ...] = ()
-
-
-def column(
-    fields: str,
-    of: str,
-    heading: str = "",
-    form: Callable[..., str] = str,
-    pair: tuple[str, str] = (OM, RM),
-    in_row_unit: bool = False,
-) -> Column:
-    """A column of numbers: ``of`` as ``test.name``, as many as there are names of ``fields``."""
-    numbers = ((test, name, *pair) for test, name in (one.split(".") for one in of.split()))
-    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))
 
 
 @dataclass(frozen=True)
@@ -82,6 +74,11 @@ class Table:
         """The row as text, marks included, in the order of the printed columns."""
         return tuple(_printed(column, row) for column in self.printed_columns())
 
+    def printed_groups(self) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+        """Name of each group of rows, empty where they have none, and its rows as text."""
+        for group, rows in groupby(self.rows, key=lambda row: row.group):
+            yield group, [self.printed_cells(row) for row in rows]
+
 
 def _printed(column: Column, row: Row) -> str:
     values = [row.values[name] for name in column.fields]
@@ -95,11 +92,11 @@ class Results:
 
     def __init__(self, comparisons: Iterable[Comparison]) -> None:
         self._about: dict[Topic, list[Comparison]] = defaultdict(list)
+        self._rows: dict[tuple[Topic, str, str, str], Comparison] = {}
         for row in comparisons:
             self._about[row.topic].append(row)
+            self._rows[row.topic, row.test, row.method_a, row.method_b] = row
         self.topics = tuple(self._about)
-        rows = (row for rows in self._about.values() for row in rows)
-        self._rows = {(row.topic, row.test, row.method_a, row.method_b): row for row in rows}
 
     def find(self, topic: Topic, test: str, first: str = OM, second: str = RM) -> Comparison:
         """The row, or one without any number if there is none."""
@@ -133,29 +130,24 @@ def unit_label(unit: str) -> str:
     return {"mm2": "mm²", "% body weight": "% BW"}.get(unit, unit)
 
 
-def number(decimals: int) -> Callable[[float], str]:
-    """A form with so many decimals, without a sign before zero."""
-    return partial(_rounded, decimals=decimals)
+def number(value: float, decimals: int = 2) -> str:
+    """Without a sign before zero."""
+    if isnan(value):
+        return ABSENT
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def mean_sd(decimals: int) -> Callable[[float, float], str]:
+def mean_sd(mean: float, sd: float, decimals: int = 2) -> str:
     """M(SD), in whole numbers from a thousand on; one participant has no SD."""
-
-    def form(mean: float, sd: float) -> str:
-        places = number(0 if abs(mean) >= 1000.0 else decimals)
-        return ABSENT if isnan(mean) else f"{places(mean)}({places(sd)})"
-
-    return form
+    digits = 0 if abs(mean) >= 1000.0 else decimals
+    return ABSENT if isnan(mean) else f"{number(mean, digits)}({number(sd, digits)})"
 
 
-def interval(decimals: int) -> Callable[[float, float], str]:
-    """A form of both ends in brackets; absent if one is."""
-
-    def form(low: float, high: float) -> str:
-        ends = [_rounded(end, decimals) for end in (low, high)]
-        return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
-
-    return form
+def interval(low: float, high: float) -> str:
+    """Both ends in brackets; absent if one is."""
+    ends = number(low), number(high)
+    return ABSENT if ABSENT in ends else f"[{', '.join(ends)}]"
 
 
 def p_value(p: float) -> str:
@@ -165,129 +157,147 @@ def p_value(p: float) -> str:
     return "<.001" if p < 0.0005 else f"{p:.3f}".removeprefix("0")
 
 
-def count(value: float) -> str:
-    """A whole number."""
-    return ABSENT if isnan(value) else f"{value:.0f}"
-
-
 def counts_of(a: float, b: float, n: float) -> str:
     """How many for the one, how many for the other, of how many."""
     return ABSENT if isnan(a) or n == 0 else f"{a:.0f} : {b:.0f} of {n:.0f}"
 
 
-def _rounded(value: float, decimals: int) -> str:
-    if isnan(value):
-        return ABSENT
-    text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text
-
-
-_COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
-_FORMS: dict[str, Callable[..., str]] = {
-    "number": number(2),
-    "interval": interval(2),
+AXES = {"cop_ap": "AP", "cop_ml": "ML"}
+FORMS: dict[str, Callable[..., str]] = {
+    "": str,
+    "number": number,
+    "interval": interval,
+    "mean_sd": mean_sd,
+    "mean_sd of 1": partial(mean_sd, decimals=3),
     "p": p_value,
+    "count": partial(number, decimals=0),
     "counts": counts_of,
+    "segment": segment_label,
+    "axis": AXES.__getitem__,
 }
 
 
-def columns(name: str, pair: tuple[str, str] = (OM, RM), **words: str) -> tuple[Column, ...]:
+TEXTS, _COLUMNS = (
+    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    for name in ("texts.toml", "columns.toml")
+)
+_GROUPS: dict[str, list[list[str]]] = _COLUMNS["groups"]
+
+
+def columns(group: str, **words: str) -> tuple[Column, ...]:
     """Those of ``columns.toml`` by that name; ``words`` go into the headings."""
     found = []
-    for fields, of, heading, form, *in_row_unit in _COLUMNS[name]:
-        how = heading.format(**words), _FORMS.get(form, str), pair
-        found.append(column(fields, of, *how, in_row_unit=bool(in_row_unit)))
+    for line in _GROUPS[group]:
+        names, of, heading, form, methods, how = line + [""] * (6 - len(line))
+        first, second = (methods or f"{OM}:{RM}").split(":")
+        tests = (one.split(".") for one in of.split())
+        numbers = tuple((test, name, first, second) for test, name in tests)
+        how_printed = heading.format(**words), FORMS[form], how == "unit", how == "text"
+        found.append(Column(tuple(names.split()), *how_printed, numbers))
     return tuple(found)
 
 
-# --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
-
-NAMED_AT_MOST = 6  # missing participants and rows that are named one by one
-
-
-TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+def columns_of(table: str, **words: str) -> tuple[Column, ...]:
+    """All of one of the papers' tables."""
+    return tuple(c for group in _COLUMNS["tables"][table] for c in columns(group, **words))
 
 
-def texts_of(
-    name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
-) -> tuple[str, tuple[str, ...]]:
-    """Title and legend of a table; ``more``: what only this one says."""
-    words = TEXTS["shared"] | more
-    numbers = sorted({row.n for row in tests} or {0})
-    how_many = " to ".join(dict.fromkeys(map(str, (numbers[0], numbers[-1]))))
-    words["n"] = f"n = {how_many} participant{'' if numbers[-1] == 1 else 's'}"
-    words |= {"alpha": f"{criteria.alpha:g}", "percent": f"{criteria.equivalence_percent:g}"}
-    words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
-    words["star"] = f"* significant: p < {_level(criteria.alpha)}."
-    words["holm"] = _holm_legend(tests, criteria.alpha)
-    words["normal"] = (
-        f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
-        "Wilcoxon's test is the one to read."
+# --- a table as text: CSV with every number in full precision and one unit per column, LaTeX, Markdown
+
+_SUFFIXES = {unit: f"_{unit}" for unit in ("kg", "mm", "m", "mm2", "N")}
+_SUFFIXES |= {"mm/s": "_mm_s", "N m": "_Nm", "% body weight": "_percent_bw", "1": ""}
+"""Of a unit, behind the names of its columns."""
+
+
+def to_csv(table: Table) -> str:
+    """Text of the file; a number that is not there is an empty cell."""
+    units = dict.fromkeys(row.unit for row in table.rows)
+    fields = [
+        (name, unit)
+        for column in table.columns
+        for unit in (units if column.in_row_unit else (None,))
+        for name in column.fields
+    ]
+    lines = [
+        [row.values[name] if unit in (None, row.unit) else "" for name, unit in fields]
+        for row in table.rows
+    ]
+    head = [name if unit is None else name + _SUFFIXES[unit] for name, unit in fields]
+    return pd.DataFrame(lines, columns=head, dtype=object).to_csv(index=False, lineterminator="\n")
+
+
+_NAMED = {"\\": "backslash", "~": "asciitilde", "^": "asciicircum"}
+_NAMED |= {"<": "less", ">": "greater", "|": "bar"}
+_SIGNS: dict[str | int, str | int | None] = {sign: rf"\{sign}" for sign in "{}&%$#_"}
+_SIGNS |= {sign: rf"\text{name}{{}}" for sign, name in _NAMED.items()}
+_SIGNS |= {"²": r"\textsuperscript{2}", "†": r"\dag{}", "–": "--", "×": r"$\times$", "−": "$-$"}
+_SIGNS |= {"\n": " "}
+
+
+def to_latex(table: Table) -> str:
+    """A float that is no wider than the page, its notes below it."""
+    columns = table.printed_columns()
+    lines = [
+        r"\begin{table}[htbp]",
+        r"\centering",
+        rf"\caption{{{escape_latex(table.title)}}}",
+        rf"\label{{tab:{table.name}}}",
+        r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%",
+        rf"\begin{{tabular}}{{{''.join('l' if c.text else 'r' for c in columns)}}}",
+        r"\toprule",
+        _latex_line([column.heading for column in columns]),
+        r"\midrule",
+        *_latex_body(table),
+        r"\bottomrule",
+        r"\end{tabular}}",
+    ]
+    if table.notes:
+        lines += [r"\par\medskip", r"\begin{minipage}{\textwidth}\footnotesize"]
+        lines += [*(rf"{escape_latex(note)}\par" for note in table.notes), r"\end{minipage}"]
+    return "\n".join([*lines, r"\end{table}", ""])
+
+
+def escape_latex(text: str) -> str:
+    """Text in which nothing is a command; a minus before a number becomes a minus."""
+    return re.sub(r"(?<![\w-])-(?=\.?\d)", "$-$", text.translate(str.maketrans(_SIGNS)))
+
+
+def _latex_body(table: Table) -> Iterator[str]:
+    width = len(table.printed_columns())
+    for k, (group, rows) in enumerate(table.printed_groups()):
+        if group:
+            yield from [r"\addlinespace"] * (k > 0)
+            yield rf"\multicolumn{{{width}}}{{l}}{{\textit{{{escape_latex(group)}}}}} \\"
+        yield from map(_latex_line, rows)
+
+
+def _latex_line(cells: Sequence[str]) -> str:
+    line = " & ".join(map(escape_latex, cells)) + r" \\"
+    return "{}" + line if line.startswith(("*", "[")) else line  # both mean something after \\\\
+
+
+def to_markdown(table: Table) -> str:
+    """Title, table with aligned columns, notes; a line with a group's name before its first row."""
+    columns = table.printed_columns()
+    lines: list[Sequence[str]] = [[column.heading for column in columns]]
+    for group, rows in table.printed_groups():
+        lines += [[group, *[""] * (len(columns) - 1)]] if group else []
+        lines += rows
+    lines = [[escape_markdown(cell) for cell in line] for line in lines]
+    widths = [max(3, *map(len, cells)) for cells in zip(*lines, strict=True)]
+    ends = [
+        "-" * w if c.text else "-" * (w - 1) + ":" for w, c in zip(widths, columns, strict=True)
+    ]
+    pads = [str.ljust if column.text else str.rjust for column in columns]
+    body = "".join(
+        f"| {' | '.join(pad(x, w) for pad, x, w in zip(pads, line, widths, strict=True))} |\n"
+        for line in (lines[0], ends, *lines[1:])
     )
-    notes = (note.format(**words) for note in TEXTS[name]["notes"])
-    return TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
+    notes = "".join(f"\n{escape_markdown(note)}\n" for note in table.notes)
+    return f"**{escape_markdown(table.title)}**\n\n{body}{notes}"
 
 
-def star(row: Comparison, alpha: float, sign: str = "*") -> str:
-    """The sign if p < alpha, else nothing."""
-    return sign if row.p_value < alpha else ""
-
-
-def _holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
-    """How many of the stars outlast the correction for their number; nothing for one test."""
-    done = [row for row in tests if not isnan(row.p_value)]
-    if len(done) < 2:
-        return ""
-    before, after = (
-        sum(p < alpha for p in ps)
-        for ps in zip(*((r.p_value, r.p_holm) for r in done), strict=True)
-    )
-    return (
-        f"The {len(done)} t tests ask one question many times: {before} have p < {_level(alpha)}, "
-        f"{after} after Holm's correction (added; p_holm in the CSV)."
-    )
-
-
-def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ...]:
-    """A sentence for each reason why a test is missing, with the labels of its rows."""
-    concerned: dict[str, dict[str, None]] = defaultdict(dict)
-    for topic, label in labels.items():
-        for row in results.about(topic):
-            if row.reason:
-                concerned[row.reason][label] = None
-    everyone = set(labels.values())
-    return tuple(
-        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else named([*names])}): "
-        f"{reason}"
-        for reason, names in concerned.items()
-    )
-
-
-def fitted_on(counts: Iterable[Mapping[str, object]]) -> tuple[str, ...]:
-    """For each task what its data were to OM: those it was fitted to, or data it never saw.
-
-    counts : task, role, and of how many participants (``everyone``) OM was fitted to its data
-        (``identification``).
-    """
-    sentences = []
-    for counted in counts:
-        task, fitted = counted["task"], counted["identification"]
-        if fitted:
-            sentences.append(
-                f"{task}: OM was fitted to these very data in {fitted} of {counted['everyone']} "
-                "participants; there its error is that of a fit, not of a prediction."
-            )
-        elif counted["role"] == "sequence":
-            sentences.append(f"{task}: only intervals that OM was not fitted to.")
-    return tuple(sentences)
-
-
-def named(names: Sequence[str], comma: str = ", ") -> str:
-    """The first names, and how many more there are."""
-    shown = comma.join(names[:NAMED_AT_MOST])
-    more = len(names) - NAMED_AT_MOST
-    return f"{shown}{comma}and {more} more" if more > 0 else shown
-
-
-def _level(alpha: float) -> str:
-    return p_value(alpha) if alpha < 0.01 else f"{alpha:g}".removeprefix("0")
+def escape_markdown(text: str) -> str:
+    """Text in which nothing is a sign of Markdown; signs that mean nothing stay as they are."""
+    text = re.sub(r"[\\|`]|(?<!\w)_(?=\S)|\*(?=\S)|^[*#>+-](?=\s)", lambda m: "\\" + m[0], text)
+    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", text)

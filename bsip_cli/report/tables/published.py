@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import nan
 
-from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table, count, mean_sd
+from bsip_cli.report.tables.model import FORMS, TEXTS, Cell, Column, Results, Row, Table
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import Paper, PrintedTable, load_paper
 from bsip_cli.statistics.published import Row as PrintedRow
@@ -19,18 +18,17 @@ _MOVED = "†"
 def printed(paper: Paper, table: PrintedTable) -> Table:
     """A table of a paper as it is printed."""
     first = table.rows[0]
+    headings = {method: method for method in table.methods}
+    headings |= {"ci": "95% CI"} if first.ci_text else {}
+    headings |= {name: name for name in ("t", "p", "d", "F") if name in first.tests}
     columns = [Column(("row",), "Row", text=True)]
-    columns += [Column((method,), method) for method in table.methods]
-    columns += [Column(("ci",), "95% CI")] if first.ci_text else []
-    columns += [Column((name,), name) for name in ("t", "p", "d", "F") if name in first.tests]
-    if any(row.unit for row in table.rows):
-        columns.append(Column(("unit",), "unit", text=True))
+    columns += [Column((name,), heading) for name, heading in headings.items()]
+    columns += [Column(("unit",), "unit", text=True)] if any(x.unit for x in table.rows) else []
     rows = []
     for row in table.rows:
         cells = {m: row.cells[m].text if m in row.cells else "" for m in table.methods}
-        rows.append(
-            Row({"row": row.name, "unit": row.unit, "ci": row.ci_text, **cells, **row.tests})
-        )
+        values = {"row": row.name, "unit": row.unit, "ci": row.ci_text}
+        rows.append(Row({**values, **cells, **row.tests}))
     title = f"{paper.name}, table {table.number}. {table.about}, as printed."
     return Table(f"{paper.key}_table{table.number}", title, tuple(columns), tuple(rows))
 
@@ -55,13 +53,14 @@ def next_to_published(tag: str, results: Results) -> Table:
     paper = load_paper(COMPARED)
     table = paper.table(int(tag.removeprefix("table")))
     meant = table.as_meant()
-    columns = [Column(("row",), "Row", text=True), Column(("n",), "n here", count)]
+    form = FORMS["mean_sd"]
+    columns = [Column(("row",), "Row", text=True), Column(("n",), "n here", FORMS["count"])]
     for method in table.methods:
-        if method in _METHODS:
-            columns.append(Column(_here(method), f"{method} here", mean_sd(2)))
-        columns.append(Column(_here(method, "_printed"), f"{method} in print", mean_sd(2)))
+        here = Column(_fields(method), f"{method} here", form)
+        columns += [here] if method in _METHODS else []
+        columns.append(Column(_fields(method, "_printed"), f"{method} in print", form))
     columns += [
-        Column(_here(RM_MASS), f"{RM_MASS} here", mean_sd(2)),
+        Column(_fields(RM_MASS), f"{RM_MASS} here", form),
         Column(("unit",), "unit here", text=True),
         Column(("printed_unit",), "unit in print", text=True),
     ]
@@ -71,33 +70,34 @@ def next_to_published(tag: str, results: Results) -> Table:
         for method in (RM_MASS, *table.methods):
             cell = true.cells.get(method)
             numbers = (cell.mean, cell.sd) if cell is not None else (nan, nan)
-            values |= dict.fromkeys(_here(method), nan)
-            values |= dict(zip(_here(method, "_printed"), numbers, strict=True))
+            values |= dict.fromkeys(_fields(method), nan)
+            values |= dict(zip(_fields(method, "_printed"), numbers, strict=True))
         moved = [m for m in table.methods if true.cells.get(m) != row.cells.get(m)]
         marks = {f"{method} in print": _MOVED for method in moved}
         rows.append(Row(values | _found_here(tag, results, row), marks=marks))
-    return Table(
-        comparison_name(tag),
-        f"Table {table.number} of {paper.name} next to this study. {table.about}: mean "
-        "(standard deviation).",
-        tuple(columns),
-        tuple(rows),
-        tuple(_notes(paper, table, meant)),
-    )
+    title = f"Table {table.number} of {paper.name} next to this study. {table.about}: mean "
+    title += "(standard deviation)."
+    notes = [f"Printed values: {paper.citation} ({paper.url})."]
+    if meant != table:
+        notes.append(f"{_MOVED} {TEXTS['published']['moved']}")
+    if unit := table.fits_unit:
+        of = " and ".join(row.name for row in table.rows if row.error_of)
+        notes.append(TEXTS["published"]["unit"].format(rows=of, unit=unit))
+    return Table(comparison_name(tag), title, tuple(columns), tuple(rows), tuple(notes))
 
 
-def _here(method: str, of: str = "") -> tuple[str, str]:
+def _fields(method: str, of: str = "") -> tuple[str, str]:
     name = method.lower().replace(" ", "_").replace("+", "_")
     return f"{name}{of}_mean", f"{name}{of}_sd"
 
 
 def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
+    """Of the same variable, in the task of that name where the row is of one."""
     variable, _, task = row.compare.partition(" ")
-    topic = None  # the same variable, in the task of that name where the row is of one
-    for one in (one for one in results.topics if one.variable == variable):
-        role_fits = one.role == "sequence" if task == "sequence" else task in ("", one.task)
-        topic = topic or (one if role_fits else None)
-    if topic is None:
+    for topic in (one for one in results.topics if one.variable == variable):
+        if topic.role == "sequence" if task == "sequence" else task in ("", topic.task):
+            break
+    else:
         return {}
     found = [results.find(topic, "paired_t")]
     if tag not in _PAIRED:
@@ -105,16 +105,7 @@ def _found_here(tag: str, results: Results, row: PrintedRow) -> dict[str, Cell]:
     names = {method: name for name, method in _METHODS.items()} | {RM_MASS: RM_MASS}
     values: dict[str, Cell] = {"unit": topic.unit, "n": found[0].n}
     for pair in (results.find(topic, "paired_t", OM, RM_MASS), *found):
-        fields = (*_here(names[pair.method_a]), *_here(names[pair.method_b]))
+        fields = (*_fields(names[pair.method_a]), *_fields(names[pair.method_b]))
         numbers = (pair.mean_a, pair.sd_a, pair.mean_b, pair.sd_b)
         values |= dict(zip(fields, numbers, strict=True))
     return values
-
-
-def _notes(paper: Paper, as_printed: PrintedTable, meant: PrintedTable) -> Iterator[str]:
-    yield f"Printed values: {paper.citation} ({paper.url})."
-    if meant != as_printed:
-        yield f"{_MOVED} In print these cells stand in each other's place (bsip published audit)."
-    if unit := as_printed.fits_unit:
-        rows = " and ".join(row.name for row in as_printed.rows if row.error_of)
-        yield f"The printed {rows} fit {unit}, whatever the text says (bsip published audit)."

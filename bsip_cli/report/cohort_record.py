@@ -11,17 +11,15 @@ import pandas as pd
 
 from bsip_cli.effects.effect import Number, digits_of, readable_unit, with_unit
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
+from bsip_cli.report.causes import Candidate, Cause, candidates_of, causes_of
 from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
-from bsip_cli.report.words import COMPONENTS, TEXTS, capital, listing, number, task_of
+from bsip_cli.report.words import COMPONENTS, TEXTS, listing, number, say, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
 from bsip_cli.statistics.samples import p_of_one_size
 
 if TYPE_CHECKING:
     from bsip_cli.report.tables.model import Table
-
-_OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
 
 SHOWN = {
     "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
@@ -59,16 +57,16 @@ def ratios_of(read: ReadValues) -> Ratios:
     """Participants in the order of their ids, each with a ratio in some component."""
     for held_out in (True, False):
         found = {name: _mean_errors(read, name, held_out) for name in COMPONENTS}
-        people = sorted(set().union(*(errors.index for errors in found.values())))
+        known = {name: errors for name, errors in found.items() if len(errors)}
+        people = sorted(set().union(*(errors.index for errors in known.values())))
         if people:
-            known = {name: errors for name, errors in found.items() if len(errors)}
             return Ratios({name: one.reindex(people) for name, one in known.items()}, held_out)
     return Ratios({}, held_out=False)
 
 
 def _mean_errors(read: ReadValues, component: str, held_out: bool) -> pd.DataFrame:
     """A row per participant with errors of OM and RM: means over the runs with all methods."""
-    rows = pd.concat([read(table, component + ending) for table, ending in _OF_TABLE.items()])
+    rows = pd.concat([read("table4", component), read("table5", f"{component}_rmse")])
     if held_out:
         rows = rows[rows["data"] == "held_out"]
     wide = rows.pivot(index=["participant", "trial"], columns="method", values="value")
@@ -139,8 +137,6 @@ _MOST_NAMED = 12  # participants in one sentence
 _MOST_SAID = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
-Cause = tuple[Candidate, ...]  # a single candidate, or all of a group of which one is there
-
 
 @dataclass(frozen=True)
 class Searched:
@@ -163,55 +159,55 @@ def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
     alike; what most people have comes first. The laboratory's faults are in its own part."""
-    found: dict[str, _Found] = {}
+    found: dict[str, dict[str, list[Candidate]]] = {}  # by the cause's label and the person
+    named: set[tuple[str, str]] = set()  # who has it, and not perhaps another
     for person in people:
         for cause in person.causes:
             for one in (x for x in cause if not x.is_of_all):
-                known = found.setdefault(one.label, _Found(one.label, {}, set()))
-                known.people.setdefault(person.id, []).append(one)
+                found.setdefault(one.label, {}).setdefault(person.id, []).append(one)
                 if len(cause) == 1:
-                    known.named_of.add(person.id)
-    shared = [one for one in found.values() if len(one.people) > 1]
-    shared.sort(key=lambda one: -len(one.people))
-    said = [_in_words(one, people) for one in shared[:_MOST_SAID]]
+                    named.add((one.label, person.id))
+    shared = sorted(((x, of) for x, of in found.items() if len(of) > 1), key=lambda x: -len(x[1]))
+    said = tuple(
+        _in_words(label, of, [x for x in of if (label, x) not in named], people)
+        for label, of in shared[:_MOST_SAID]
+    )
     left = len(shared) - len(said)
-    return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
+    return (*said, f"And {left} more, see the participants' reports.") if left else said
 
 
-@dataclass
-class _Found:
-    """A cause by its label: who has it, what of each, and for whom it may be another one."""
-
-    label: str
-    people: dict[str, list[Candidate]]
-    named_of: set[str]
-
-
-def _in_words(found: _Found, people: Sequence[Searched]) -> str:
-    unsure = [person for person in found.people if person not in found.named_of]
-    possibly = "possibly " if not found.named_of else ""
+def _in_words(
+    label: str,
+    of: Mapping[str, Sequence[Candidate]],
+    unsure: Sequence[str],
+    people: Sequence[Searched],
+) -> str:
+    """``of``: who has it, and what of each; ``unsure``: for whom it may be another cause."""
     # how many could have shown it: a recording of the same task was searched; of quiet stance,
     # which is no search, everybody counts
-    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
+    every = [one for some in of.values() for one in some]
+    tasks = {task_of(trial) for one in every for trial in one.trials}
     of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
     asked = len(of_each)
     if not tasks.isdisjoint(set().union(*of_each.values())):
-        could = (not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
-        asked = sum(could)
-    where = f"{possibly}in {len(found.people)} of {asked} participants"
-    if len(found.people) < asked:
-        where += f" ({named_people(list(found.people))})"
-    every = [one.main_number() for of in found.people.values() for one in of]
-    text = f"{capital(found.label)}: {where}{_sizes(every)}"
-    if not unsure:
-        return f"{text}."
-    which = "all of them" if len(unsure) == len(found.people) else named_people(unsure)
-    return f"{text}; one of several that look alike in {which}."
+        asked = sum(not tasks.isdisjoint(own) or p in of for p, own in of_each.items())
+    known = [one.main_number() for one in every]
+    return say(
+        "shared",
+        label=label,
+        of=len(of),
+        asked=asked,
+        who=named_people([*of]),
+        sizes=_sizes([n for n in known if n is not None]) if None not in known else "",
+        unsure=len(unsure),
+        which="all of them" if len(unsure) == len(of) else named_people(unsure),
+    )
 
 
-def _sizes(numbers: Sequence[Number | None]) -> str:
-    known = [n for n in numbers if n is not None]
-    if len(known) < len(numbers) or len({n.name for n in known}) > 1:
+def _sizes(known: Sequence[Number]) -> str:
+    """From the least to the largest, and whether they may be one; empty where they are of several
+    parameters."""
+    if len({n.name for n in known}) > 1:
         return ""
     factor, unit = readable_unit(known[0].name, known[0].unit)
     values = factor * np.array([n.value for n in known])

@@ -282,7 +282,7 @@ class Person:
         return _InMemory(stage, *whole, trial, recordings=self._recordings, kept=self._kept)
 
 
-@dataclass
+@dataclass(eq=False)
 class _InMemory(Unit):
     """A unit whose tables, with what is said of them, stay in memory, by the paths that they would
     have."""

@@ -19,10 +19,9 @@ from bsip_cli.artifacts import is_made_from
 from bsip_cli.diagnosis.cause import Cause, corrected_plates, delay_by
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
-from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.nameless import UNEXPLAINED
-from bsip_cli.effects.plates import ALL, Delay, FrameRate, loaded_plates
+from bsip_cli.effects.plates import ALL, Delay, FrameRate, GravityTilt, Turned, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash

@@ -15,7 +15,7 @@ from bsip_cli.effects.plates import (
     PlateRotation,
     corrected,
     loaded_plates,
-    plate_of,
+    plates_of,
     right_times_s,
 )
 from bsip_cli.effects.scene import Scene
@@ -139,7 +139,7 @@ def corrected_plates(scene: Scene, causes: Sequence[Cause]) -> dict[str, np.ndar
             if cause.effect.of_the_plates and cause.target.split(" ")[0] in names:
                 one = plate
                 if isinstance(cause.effect, PlateRotation) and cause.target == ALL:
-                    middle = np.mean([plate_of(scene, name).centre_m() for name in loaded], axis=0)
+                    middle = np.mean([p.centre_m() for p in plates_of(scene, ALL)], axis=0)
                     one = replace(plate, corners_m=plate.corners_m + middle - plate.centre_m())
                 alone = replace(scene, plates=(one,), wrench=plate.wrench)
                 wrench = wrench - change_by([cause], alone)

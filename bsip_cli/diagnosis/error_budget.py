@@ -6,6 +6,7 @@ square; with noise and unknown, which share what no term explains, the shares ad
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,16 +15,17 @@ from itertools import permutations
 import numpy as np
 from scipy.stats import chi2
 
-from bsip_cli.diagnosis.error_model import ErrorModel, Part, TrialErrors
+from bsip_cli.diagnosis.error_model import ErrorModel, Part
 from bsip_cli.diagnosis.findings import Finding, interval_words
 from bsip_cli.effects.effect import Number, Words
 from bsip_cli.effects.nameless import UNEXPLAINED
-from bsip_cli.effects.plates import OF_THE_LAB
+from bsip_cli.effects.plates import OF_THE_LAB, unit_of
 from bsip_cli.statistics.choice import ErrorGain, block_errors, error_gain, pooled
 from bsip_cli.statistics.samples import Z95, effective_samples
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 UNKNOWN, NOISE, TOTAL = "unknown", "noise", "total"
+_NO_GAIN = ErrorGain(*[np.nan] * 5)
 _SURER = 0.5  # of the smaller spread, that the sum of two terms has which stand in for each other
 
 
@@ -85,12 +87,9 @@ class Line:
     share: float
     share_low: float
     share_high: float
-    gain: ErrorGain
-    scale: float
+    gain: ErrorGain = _NO_GAIN
+    scale: float = np.nan
     alike: tuple[str, ...] = ()
-
-
-_NO_GAIN = ErrorGain(*[np.nan] * 5)
 
 
 def budget_of(
@@ -102,20 +101,16 @@ def budget_of(
 
 @dataclass(frozen=True, eq=False)
 class _Budget:
+    """Arrays (n, 8) of a trial's components are by trial, of those that are asked."""
+
     model: ErrorModel
     grounds: tuple[Ground, ...]
     trials: tuple[int, ...]
     rng: np.random.Generator
 
     @cached_property
-    def errors(self) -> dict[int, TrialErrors]:
-        """By trial, of those that are asked."""
-        return {t: self.model.session.trials[t] for t in self.trials}
-
-    @cached_property
     def residual(self) -> dict[int, np.ndarray]:
-        """By trial (n, 8)."""
-        return {t: self.grounds[t].seen(one.residual) for t, one in self.errors.items()}
+        return {t: self.grounds[t].seen(self.model.session.trials[t].residual) for t in self.trials}
 
     @cached_property
     def squares(self) -> np.ndarray:
@@ -140,122 +135,110 @@ class _Budget:
         seen = np.nan_to_num(self.grounds[trial].components * self.residual[trial][:, :, None])
         return np.tensordot(seen, columns, axes=([0, 2], [0, 1])) / self.squares[:, None]
 
+    def _spread(self, coefficients: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+        """(8,) standard deviation of a share: it is linear in the coefficients."""
+        inside = self.model.solution.covariance[np.ix_(coefficients, coefficients)]
+        weights = self.weights[:, coefficients] if weights is None else weights
+        return np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
+
     def lines(self) -> Iterator[Line]:
-        here = tuple(p for p in self.model.session.parts if p.trial in (-1, *self.trials))
-        terms = list(dict.fromkeys(p.term for p in here))
-        alike = self._alike(here, terms)
-        for term in terms:
-            whole = tuple(p for p in here if p.term == term)
+        here = [p for p in self.model.session.parts if p.trial in (-1, *self.trials)]
+        terms: dict[str, list[Part]] = {}
+        for part in here:
+            terms.setdefault(part.term, []).append(part)
+        alike = self._alike(terms)
+        for term, whole in terms.items():
+            yield from self._inside(term, [p for p in whole if p.mixing is not None])
             targets = dict.fromkeys(p.target for p in whole)
-            yield from self._inside(term, tuple(p for p in whole if p in self.model.session.mixed))
             for target in ("", *(t for t in targets if t and len(targets) > 1)):
-                parts = tuple(p for p in whole if not target or p.target == target)
-                changes = {t: self.grounds[t].seen(self._change(parts, t)) for t in self.trials}
-                known = self._spread(parts), self._scale(parts), self._gains(parts)
-                for one in self._lines(term, target, changes, *known):
-                    yield replace(one, alike=alike.get((term, one.component), ()))
+                parts = [p for p in whole if not target or p.target == target]
+                changes = {t: self._change(parts, t) for t in self.trials}
+                lines = self._lines(term, target, changes, self._spread(_coefficients(parts)))
+                for one, gain in zip(lines, self._gains(parts), strict=True):
+                    others, scale = alike.get((term, one.component), ()), self._scale(parts)
+                    yield replace(one, gain=gain, scale=scale, alike=others)
         yield from self._rest()
-        gains, rms = self._gains(here), np.sqrt(self.squares / self.count)
-        for k, name in enumerate(COMPONENTS):
-            yield Line(TOTAL, "", name, float(rms[k]), 1.0, 1.0, 1.0, gains[k], np.nan)
+        rms = np.sqrt(self.squares / self.count)
+        for name, size, gain in zip(COMPONENTS, rms, self._gains(here), strict=True):
+            yield Line(TOTAL, "", name, float(size), 1.0, 1.0, 1.0, gain)
 
     def _lines(
-        self,
-        term: str,
-        target: str,
-        changes: Mapping[int, np.ndarray],
-        spread: np.ndarray,
-        scale: float,
-        gains: Sequence[ErrorGain] = (_NO_GAIN,) * len(COMPONENTS),
+        self, term: str, target: str, changes: Mapping[int, np.ndarray], spread: np.ndarray
     ) -> Iterator[Line]:
         """Of all components, of what it changes (n, 8) in the trials; spread (8,) : standard
         deviations of the shares."""
         rms = np.sqrt(_sum(x**2 for x in changes.values()) / self.count)
         share = _sum(x * self.residual[t] for t, x in changes.items()) / self.squares
-        half = Z95 * spread
-        for k, name in enumerate(COMPONENTS):
-            interval = share[k] - half[k], share[k] + half[k]
-            yield Line(term, target, name, rms[k], share[k], *interval, gains[k], scale)
+        numbers = zip(rms, share, share - Z95 * spread, share + Z95 * spread, strict=True)
+        for name, of_component in zip(COMPONENTS, numbers, strict=True):
+            yield Line(term, target, name, *of_component)
 
-    def _scale(self, parts: tuple[Part, ...]) -> float:
-        return float(np.mean([self.model.scales[p.scale] for p in parts]))
-
-    def _inside(self, term: str, parts: tuple[Part, ...]) -> Iterator[Line]:
+    def _inside(self, term: str, parts: Sequence[Part]) -> Iterator[Line]:
         """The targets of terms whose coefficients are several targets' at once."""
         if not parts:
             return
-        model, mine = self.model, _coefficients(parts)
-        mixed = np.concatenate([model.session.mixed[p] for p in parts], axis=1)
-        inside = model.solution.covariance[np.ix_(mine, mine)]
-        bare = {
-            t: next(x for x in one.terms if x.scale == parts[0].scale)
-            for t, one in self.errors.items()
-        }
-        targets = next(iter(bare.values())).targets
-        wide = len(mixed) // len(targets)
-        for k, target in enumerate(targets):
-            rows = slice(wide * k, wide * (k + 1))
-            columns = {t: one.columns[..., rows] for t, one in bare.items()}
-            sizes = mixed[rows] @ model.mean[mine]
+        mine, scale, trials = _coefficients(parts), parts[0].scale, self.model.session.trials
+        mixing = np.concatenate([p.mixing for p in parts], axis=1)
+        own = {t: next(x for x in trials[t].terms if x.scale == scale) for t in self.trials}
+        targets = next(iter(own.values())).targets
+        for k, rows in enumerate(np.split(np.arange(len(mixing)), len(targets))):
+            columns = {t: x.columns[..., rows] @ mixing[rows] for t, x in own.items()}
+            sizes = self.model.mean[mine]
             changes = {t: self.grounds[t].seen(x @ sizes) for t, x in columns.items()}
-            weights = sum(self._shares(t, x) for t, x in columns.items()) @ mixed[rows]
-            spread = np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
-            yield from self._lines(term, target, changes, spread, self._scale(parts))
+            weights = np.sum([self._shares(t, x) for t, x in columns.items()], axis=0)
+            for one in self._lines(term, targets[k], changes, self._spread(mine, weights)):
+                yield replace(one, scale=self._scale(parts))
 
     def _rest(self) -> Iterator[Line]:
         """What no term explains: as much of it as the instruments' noise makes, and the unknown."""
         left = {t: self.grounds[t].seen(self.model.left[t]) for t in self.trials}
-        noisy = _sum(self.grounds[t].components ** 2 @ x.noise**2 for t, x in self.errors.items())
-        found = self._lines(UNKNOWN, "", left, self._spread(self.model.session.parts), np.nan)
+        own = {t: self.model.session.trials[t].noise for t in self.trials}
+        noisy = _sum(self.grounds[t].components ** 2 @ x**2 for t, x in own.items())
         unknown = np.sqrt(np.maximum(_sum(x**2 for x in left.values()) - noisy, 0.0) / self.count)
         noise = np.sqrt(noisy / self.count)
-        for k, one in enumerate(found):
+        spread = self._spread(np.arange(len(self.model.mean)))
+        for k, one in enumerate(self._lines(UNKNOWN, "", left, spread)):
             share = np.clip(noisy[k] / self.squares[k], 0.0, max(one.share, 0.0))
             low, high = one.share_low - share, one.share_high - share
-            known = {"rms": unknown[k], "share_low": low, "share_high": high}
-            yield replace(one, share=one.share - share, **known)
-            yield Line(NOISE, "", one.component, noise[k], share, share, share, _NO_GAIN, np.nan)
+            yield Line(UNKNOWN, "", one.component, unknown[k], one.share - share, low, high)
+            yield Line(NOISE, "", one.component, noise[k], share, share, share)
+
+    def _scale(self, parts: Sequence[Part]) -> float:
+        return float(np.mean([self.model.scales[p.scale] for p in parts]))
 
     def _change(
         self, parts: Sequence[Part], trial: int, mean: np.ndarray | None = None
     ) -> np.ndarray:
-        none = np.zeros_like(self.errors[trial].residual)
-        return sum((self.model.of(part, trial, mean) for part in parts), none)
-
-    def _spread(self, parts: Sequence[Part]) -> np.ndarray:
-        """(8,) standard deviation of a share: it is linear in the coefficients."""
-        mine = _coefficients(parts)
-        weights, inside = self.weights[:, mine], self.model.solution.covariance[np.ix_(mine, mine)]
-        return np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
+        each = [self.model.of(part, trial, mean) for part in parts]
+        return self.grounds[trial].seen(np.sum(each, axis=0))
 
     def _gains(self, parts: Sequence[Part]) -> list[ErrorGain]:
         """Per component, from coefficients that rest on the other folds; none of what is a trial's
         own where the trial is held out as a whole."""
-        folds = [(f, x) for f, x in zip(self.model.folds, self.model.without, strict=True)]
-        folds = [(f, x) for f, x in folds if f.trial in self.trials]
-        if len(self.model.folds) < 2 or not any(
-            p.trial == -1 or sum(f.trial == p.trial for f, _ in folds) > 1 for p in parts
-        ):
+        folds = [
+            (fold, mean)
+            for fold, mean in zip(self.model.folds, self.model.without, strict=True)
+            if fold.trial in self.trials
+        ]
+        count = Counter(fold.trial for fold, _ in folds)
+        if len(self.model.folds) < 2 or not any(p.trial == -1 or count[p.trial] > 1 for p in parts):
             return [_NO_GAIN] * len(COMPONENTS)
         errors = []
         for fold, mean in folds:
-            ground, before = self.grounds[fold.trial], self.residual[fold.trial][fold.rows]
-            change = ground.seen(self._change(parts, fold.trial, mean))[fold.rows]
-            blocks = ground.blocks[fold.rows]
-            pairs = zip(before.T, change.T, strict=True)
-            errors.append([block_errors(0 * x, x, x - c, blocks) for x, c in pairs])
+            before = self.residual[fold.trial][fold.rows]
+            after = before - self._change(parts, fold.trial, mean)[fold.rows]
+            blocks = self.grounds[fold.trial].blocks[fold.rows]
+            pairs = zip(before.T, after.T, strict=True)
+            errors.append([block_errors(0 * x, x, y, blocks) for x, y in pairs])
         return [error_gain(pooled([*one]), self.rng) for one in zip(*errors, strict=True)]
 
-    def _alike(
-        self, here: Sequence[Part], terms: Sequence[str]
-    ) -> dict[tuple[str, str], tuple[str, ...]]:
+    def _alike(self, terms: Mapping[str, Sequence[Part]]) -> dict[tuple[str, str], tuple[str, ...]]:
         """By term and component, the terms with which its sum is surer than either alone: they
         stand in for each other."""
-        of = {term: [p for p in here if p.term == term] for term in terms}
-        spread = {term: self._spread(parts) for term, parts in of.items()}
+        spread = {term: self._spread(_coefficients(parts)) for term, parts in terms.items()}
         found: dict[tuple[str, str], tuple[str, ...]] = {}
         for a, b in permutations(terms, 2):
-            both = self._spread([*of[a], *of[b]])
+            both = self._spread(_coefficients([*terms[a], *terms[b]]))
             surer = both < _SURER * np.minimum(spread[a], spread[b])
             for component in np.array(COMPONENTS)[surer].tolist():
                 found[a, component] = (*found.get((a, component), ()), b)
@@ -302,13 +285,12 @@ class Yardsticks:
 
 @dataclass(frozen=True)
 class _Large:
-    """An error of a component in a trial: its size [N, N m, m] with standard error, as a part of
-    the yardstick; correlation of what is simulated with what is measured; p-value of noise."""
+    """An error of a component in a trial: its size [N, N m, m] with interval, and as a part of the
+    yardstick; correlation of what is simulated with what is measured; p-value of noise."""
 
     trial: str
     component: str
-    error: float
-    standard_error: float
+    size: Number
     part: float
     correlation: float
     p_value: float
@@ -327,51 +309,45 @@ def large_errors(
     component goes along with, in words.
     """
     found = [one for t in trials for one in _of_trial(usual, grounds[t], t, yardsticks)]
-    return (_finding(found, yardsticks, along),) if found else ()
-
-
-def _of_trial(
-    usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
-) -> Iterator[_Large]:
-    one = usual.session.trials[trial]
-    left, measured = ground.seen(usual.left[trial]), ground.measured
-    noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
-    for k, name in enumerate(COMPONENTS):
-        known = np.isfinite(left[:, k])
-        if not known.any():
-            continue
-        error, seen, yardstick = left[known, k], measured[known, k], yardsticks.of(name)
-        size = float(np.sqrt((error**2).mean()))
-        correlation = np.nan
-        if seen.std() > _LOUD * yardstick and (seen - error).std() > 0:
-            correlation = float(np.corrcoef(seen, seen - error)[0, 1])
-        if size > yardstick or correlation < yardsticks.correlation:
-            samples = max(effective_samples(error), 1.0)
-            p_value = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
-            spread = size / np.sqrt(2 * samples)
-            yield _Large(one.name, name, size, spread, size / yardstick, correlation, p_value)
-
-
-def _finding(
-    found: Sequence[_Large], yardsticks: Yardsticks, along: Callable[[Sequence[str], str], str]
-) -> Finding:
+    if not found:
+        return ()
     worst = max(found, key=lambda one: one.part)
-    unit = "m" if worst.component.startswith("cop") else "N m" if worst.component[0] == "m" else "N"
-    half = Z95 * worst.standard_error
-    number = Number("error", unit, worst.error, max(worst.error - half, 0.0), worst.error + half)
-    factor, read = (1000.0, "mm") if unit == "m" else (1.0, unit)
-    trials = tuple(dict.fromkeys(one.trial for one in found))
+    factor, read = (1000.0, "mm") if worst.size.unit == "m" else (1.0, worst.size.unit)
+    trials_with = tuple(dict.fromkeys(one.trial for one in found))
     follows = (
         f", and simulated and measured hardly go together (correlation {worst.correlation:.2f})"
         if worst.correlation < yardsticks.correlation
         else ""
     )
     size = (
-        f"{factor * worst.error:.3g} {read} of {_WORDS[worst.component]} (RMS) remain "
+        f"{factor * worst.size.value:.3g} {read} of {_WORDS[worst.component]} (RMS) remain "
         f"unexplained{follows}"
     )
     large = f"large is {factor * yardsticks.of(worst.component):.3g} {read} and more"
-    what = f"large error, cause unknown: {size}; {large}; {along(trials, worst.component)}"
-    said = UNEXPLAINED, "", trials, (number,), Words(what, size, large)
-    closing = interval_words((number,))
-    return Finding(*said, worst.p_value, 1 - worst.p_value, closing=closing)
+    what = f"large error, cause unknown: {size}; {large}; {along(trials_with, worst.component)}"
+    said = UNEXPLAINED, "", trials_with, (worst.size,), Words(what, size, large)
+    closing = interval_words((worst.size,))
+    return (Finding(*said, worst.p_value, 1 - worst.p_value, closing=closing),)
+
+
+def _of_trial(
+    usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
+) -> Iterator[_Large]:
+    one = usual.session.trials[trial]
+    left = ground.seen(usual.left[trial])
+    noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
+    for name, own, seen, quiet in zip(COMPONENTS, left.T, ground.measured.T, noise, strict=True):
+        known, yardstick = np.isfinite(own), yardsticks.of(name)
+        error, measured = own[known], seen[known]
+        if not len(error):
+            continue
+        size, correlation = float(np.sqrt((error**2).mean())), np.nan
+        if measured.std() > _LOUD * yardstick and (measured - error).std() > 0:
+            correlation = float(np.corrcoef(measured, measured - error)[0, 1])
+        if size > yardstick or correlation < yardsticks.correlation:
+            samples = max(effective_samples(error), 1.0)
+            p_value = float(chi2.sf(samples * (size / quiet) ** 2, samples))
+            half = Z95 * (size / np.sqrt(2 * samples))
+            unit = "m" if name.startswith("cop") else unit_of(name)
+            number = Number("error", unit, size, max(size - half, 0.0), size + half)
+            yield _Large(one.name, name, number, size / yardstick, correlation, p_value)

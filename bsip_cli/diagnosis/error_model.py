@@ -8,14 +8,16 @@ noise of the instruments.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from bsip_cli.diagnosis.error_terms import FAULT, Term, as_simulated
-from bsip_cli.diagnosis.filtering import FLOOR, Filter, recursion_of
+from bsip_cli.diagnosis.filtering import Filter, noise_like
 from bsip_cli.diagnosis.normal_equations import Equations, Solution, solved
 from bsip_cli.effects.scene import Scene
 
@@ -65,20 +67,23 @@ class TrialErrors:
         return ((self.times_s - self.times_s[0]) / BLOCK_S).astype(int)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
-    """Coefficients ``start`` to ``stop`` are a term's at a target, in one trial or in all (-1)."""
+    """Coefficients (m,) of a term at a target, in one trial or in all (-1).
+
+    at : by trial, which columns of the session they are about. known : by trial, (n, 6) what a
+    named fault adds at its size. mixing : (P, m) from them to the coefficients of the term's own
+    columns, where several targets have one.
+    """
 
     term: str
     target: str
     scale: str
     trial: int
-    start: int
-    stop: int
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        return np.arange(self.start, self.stop)
+    coefficients: np.ndarray
+    at: dict[int, slice]
+    known: dict[int, np.ndarray]
+    mixing: np.ndarray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,21 +91,17 @@ class Session:
     """All trials of a person, and their terms laid out.
 
     used : per trial which coefficients (K',) the last axis of its ``columns`` (n, 6, K') is about.
-    known : (n, 6) what a named fault adds to a trial at its size.
-    mixed : (P, m) of a part, from whose coefficients it turns to those of a term's own columns.
     """
 
     trials: tuple[TrialErrors, ...]
     parts: tuple[Part, ...]
     used: tuple[np.ndarray, ...]
     columns: tuple[np.ndarray, ...]
-    known: dict[tuple[Part, int], np.ndarray]
-    mixed: dict[Part, np.ndarray]
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Of coefficients."""
-        return self.parts[-1].stop
+        return sum(len(part.coefficients) for part in self.parts)
 
     @cached_property
     def scales(self) -> dict[str, np.ndarray]:
@@ -119,57 +120,25 @@ def session_of(trials: Sequence[TrialErrors]) -> Session:
             key = (term.term, term.target, term.scale, t if term.own else -1)
             groups.setdefault(key, {})[t] = term
     parts: list[Part] = []
-    known, mixed = {}, {}
-    used: list[list[np.ndarray]] = [[] for _ in trials]
+    used: list[list[int]] = [[] for _ in trials]
     columns: list[list[np.ndarray]] = [[] for _ in trials]
-    start = 0
+    count = 0
     for key, terms in groups.items():
         units = {t: x.of_unit_variance for t, x in terms.items()}
         white = [unit / trials[t].noise[:, None] for t, unit in units.items()]
         flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
         values, vectors = np.linalg.eigh(flat.T @ flat)
         turn = vectors[:, values > _NEGLIGIBLE]  # the same covariance by as few as matter
-        part = Part(*key, start, start + turn.shape[1])
-        parts.append(part)
-        start = part.stop
-        for t, term in terms.items():
-            used[t].append(part.coefficients)
-            columns[t].append(units[t] @ turn)
-            if term.known is not None:
-                known[part, t] = term.known
-            if term.mixing is not None:
-                mixed[part] = term.mixing @ turn
+        mine = np.arange(count, count := count + turn.shape[1])
+        at = {t: slice(len(used[t]), len(used[t]) + len(mine)) for t in terms}
+        known = {t: x.known for t, x in terms.items() if x.known is not None}
+        mixing = [x.mixing @ turn for x in terms.values() if x.mixing is not None]
+        parts.append(Part(*key, mine, at, known, mixing[-1] if mixing else None))
+        for t, unit in units.items():
+            used[t] += mine.tolist()
+            columns[t].append(unit @ turn)
     together = tuple(np.concatenate(one, axis=2) for one in columns)
-    laid = tuple(np.concatenate(one) for one in used)
-    return Session(tuple(trials), tuple(parts), laid, together, known, mixed)
-
-
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """What may be left of a trial: an autoregression of innovations of size (6,) and recursion
-    (6, p)."""
-
-    filter: Filter
-    size: np.ndarray
-    recursion: np.ndarray
-
-    def white(self, columns: np.ndarray) -> np.ndarray:
-        """(6 n, k) of filtered columns (n, 6, k)."""
-        return self.filter.innovations(columns / self.size[:, None], self.recursion)
-
-
-def noise_like(one: TrialErrors, signal: np.ndarray) -> Noise:
-    """Of a signal (n, 6) that may be left of a trial; it is never quieter than the instruments."""
-    spread = np.maximum(signal.std(axis=0), one.noise)
-    share = one.noise / spread
-    recursion = np.stack(
-        [
-            recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
-            for x, s in zip((signal / spread).T, share, strict=True)
-        ]
-    )
-    white = Noise(one.filter, spread, recursion).white(signal[..., None]).reshape(-1, 6)
-    return Noise(one.filter, spread * np.maximum(white.std(axis=0), share), recursion)
+    return Session(tuple(trials), tuple(parts), tuple(map(np.array, used)), together)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,11 +171,11 @@ class ErrorModel:
 
     def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
         """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
-        used = self.session.used[trial]
-        here = np.flatnonzero((used >= part.start) & (used < part.stop))
-        x = (self.mean if mean is None else mean)[used[here]]
-        known = self.session.known.get((part, trial), 0.0)
-        return self.session.columns[trial][..., here] @ x + known
+        if trial not in part.at:
+            return np.zeros_like(self.left[trial])
+        x = (self.mean if mean is None else mean)[part.coefficients]
+        columns = self.session.columns[trial][..., part.at[trial]]
+        return columns @ x + part.known.get(trial, 0.0)
 
     @cached_property
     def without(self) -> tuple[np.ndarray, ...]:
@@ -223,7 +192,7 @@ def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -
     """
     session = session_of(trials)
     residual = [one.residual for one in trials]
-    for (_, t), known in session.known.items():
+    for t, known in (pair for part in session.parts for pair in part.known.items()):
         residual[t] = residual[t] - known
     signals = residual
     for _ in range(_ROUNDS):
@@ -242,12 +211,13 @@ def _folds(
     session: Session, trial: int, residual: np.ndarray, signal: np.ndarray, parts: int
 ) -> Iterator[Fold]:
     """White equations of a trial; ``signal`` (n, 6) is what may be left of it."""
-    noise = noise_like(session.trials[trial], signal)
-    white, right = noise.white(session.columns[trial]), noise.white(residual[..., None])[:, 0]
+    one, used = session.trials[trial], session.used[trial]
+    noise = noise_like(one.filter, signal, one.noise)
+    white, right = noise.white(session.columns[trial]), noise.white_one(residual)
     for part in np.array_split(np.arange(len(signal)), min(parts, len(signal))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         mine = white[at].T
-        yield Fold(session.used[trial], mine @ white[at], mine @ right[at], trial, part)
+        yield Fold(used, mine @ white[at], mine @ right[at], trial, part)
 
 
 def left_by(
@@ -260,27 +230,56 @@ def left_by(
 
 
 def _solution(
-    folds: Sequence[Fold], session: Session, adapt: bool
+    folds: Iterable[Fold], session: Session, adapt: bool
 ) -> tuple[Solution, dict[str, float]]:
     """Coefficients, and the scales of the largest evidence."""
-    by_trial: dict[int, list[Fold]] = {}
-    for one in folds:
-        by_trial.setdefault(one.trial, []).append(one)
-    equations = [
-        Equations(
-            x[0].used, np.sum([k.gram for k in x], axis=0), np.sum([k.against for k in x], axis=0)
+    equations = []
+    for _, some in groupby(folds, key=lambda one: one.trial):
+        mine = list(some)
+        gram, against = (
+            np.sum(x, axis=0) for x in zip(*((k.gram, k.against) for k in mine), strict=True)
         )
-        for x in by_trial.values()
-    ]
-    shown = np.zeros(session.count, dtype=bool)  # the others, of a trial that is held out, stay
-    shown[np.concatenate([one.used for one in equations])] = True
+        equations.append(Equations(mine[0].used, gram, against))
+    # the coefficients of a trial that is held out stay
+    shown = np.isin(np.arange(session.count), np.concatenate([one.used for one in equations]))
     at = {scale: mine[shown[mine]] for scale, mine in session.scales.items()}
-    root = np.ones(session.count)
-    for _ in range(_STEPS if adapt else 0):
-        found = solved(equations, root)
-        second, root = found.mean**2 + found.variance, root.copy()
-        for scale, mine in at.items():
-            weight = WEIGHT_OF_FAULTS if scale.startswith(FAULT) else WEIGHT
-            root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
-    scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
-    return solved(equations, root), scales
+    weights = (WEIGHT_OF_FAULTS if scale.startswith(FAULT) else WEIGHT for scale in at)
+    scales = [Scale(*one) for one in zip(at.values(), weights, strict=True)]
+    root = adapted(equations, np.ones(session.count), scales, _STEPS if adapt else 0)
+    found = {s: float(root[mine[0]]) if len(mine) else 1.0 for s, mine in at.items()}
+    return solved(equations, root), found
+
+
+class Scale(NamedTuple):
+    """Coefficients (k,) whose standard deviation follows from the data: their mean square, that it
+    is 1 counting for so many observations (``weight``), within bounds."""
+
+    coefficients: np.ndarray
+    weight: float
+    bounds: tuple[float, float] = (0.0, np.inf)
+
+
+def adapted(
+    equations: Sequence[Equations],
+    root: np.ndarray,
+    scales: Sequence[Scale],
+    steps: int,
+    steady: float = 0.0,
+) -> np.ndarray:
+    """(K,) standard deviations before the data of the largest evidence, by expectation and
+    maximisation from ``root`` (K,), until none changes by a part of ``steady``."""
+    for _ in range(steps):
+        before, root = root, root.copy()
+        found = solved(equations, before)
+        second = found.mean**2 + found.variance
+        for mine, weight, bounds in scales:
+            square = (weight + second[mine].sum()) / (weight + len(mine))
+            root[mine] = np.clip(np.sqrt(square), *bounds)
+        if np.abs(root / before - 1).max() < steady:
+            break
+    return root
+
+
+def log_prior_of_scales(scales: np.ndarray, weight: float) -> float:
+    """Logarithm of their density before the data, less a constant; ``weight`` : as of a scale."""
+    return -0.5 * weight * float((2 * np.log(scales) + 1 / scales**2 - 1).sum())

@@ -15,9 +15,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.ground_wrench import move_moments, wrench_regressor
+from bsip_cli.effects.body import JointCentre
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.frames import GravityTilt
-from bsip_cli.effects.joints import JointCentre
+from bsip_cli.effects.plates import GravityTilt
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
@@ -117,7 +117,7 @@ def error_terms(
     for effect in CATALOGUE:
         if not (effect.of_the_forces or isinstance(effect, GravityTilt)):
             continue  # not of plates, clocks or the lab's vertical
-        name, own = FAULT + effect.name, not effect.is_of_laboratory  # one for the session
+        name, own = FAULT + effect.name, effect.scope != "laboratory"  # one for the session
         for target in effect.targets(scene):  # each place, as far as every laboratory has it
             null = np.zeros(len(effect.parameters(source, target)))
             wrench = SHARE * effect.signature(source, target, null)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -27,6 +27,7 @@ _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
 _UNDETERMINED = 1e-3
 # Of what the likeliest combination of parameters is determined: less is rounding.
 _DETERMINED = 1e-5
+Key = TypeVar("Key")
 _MEDIANS = [np.nan, *chi2.median(np.arange(1, 50))]
 
 
@@ -43,9 +44,6 @@ class Candidate(NamedTuple):
         values = np.zeros(len(free))
         values[~free] = self.scanned
         return values
-
-
-_Products = tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]
 
 
 class Kind(NamedTuple):
@@ -67,6 +65,9 @@ class Place(NamedTuple):
         return Kind(self.candidate.effect, self.candidate.target, self.trials)
 
 
+_Products = tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]
+
+
 @dataclass(frozen=True, eq=False)
 class Library:
     """All places of all effects in the trials of a session.
@@ -81,15 +82,6 @@ class Library:
     places: tuple[Place, ...]
     prior_odds: float
     log_prior: np.ndarray
-
-    @cached_property
-    def widths(self) -> dict[int, list[int]]:
-        """Numbers of the places with as many free parameters."""
-        found: dict[int, list[int]] = {}
-        for k, place in enumerate(self.places):
-            part = self.parts[place.trials[0]][place.candidate]
-            found.setdefault(part.stop - part.start, []).append(k)
-        return found
 
     @cached_property
     def kinds(self) -> dict[Kind, list[int]]:
@@ -155,21 +147,20 @@ def _signatures(
         for scanned in effect.scans(scene, target)
     ]
     counts = [int(one.effect.is_free(scene, one.target).sum()) for one in candidates]
-    ends = np.cumsum([0, *counts]).tolist()
-    columns = np.zeros((*trial.residual.shape, ends[-1]), np.float32)
+    pairs = [*zip(candidates, pairwise(np.cumsum([0, *counts]).tolist()), strict=True)]
+    columns = np.zeros((*trial.residual.shape, sum(counts)), np.float32)
     parts = {}
-    for first in range(0, len(candidates), _BATCH):
-        batch = candidates[first : first + _BATCH]
+    for batch in (pairs[k : k + _BATCH] for k in range(0, len(pairs), _BATCH)):
         signatures = [
             one.effect.signature(trial.simulated, one.target, one.null(trial.simulated))
-            for one in batch
+            for one, _ in batch
         ]
         filtered = trial.filter(np.concatenate(signatures, axis=2))
-        mine = ends[first : first + len(batch) + 1]
-        columns[..., mine[0] : mine[-1]] = filtered
-        for candidate, (start, stop) in zip(batch, pairwise(mine), strict=True):
-            touched = filtered[..., start - mine[0] : stop - mine[0]].any(axis=(0, 1))
-            if touched.all():  # else it touches no valid frame
+        begin, end = batch[0][1][0], batch[-1][1][1]
+        columns[..., begin:end] = filtered
+        touched = np.asarray(filtered.any(axis=(0, 1)))
+        for candidate, (start, stop) in batch:
+            if touched[start - begin : stop - begin].all():  # else it touches no valid frame
                 parts[candidate] = slice(start, stop)
     return columns, parts
 
@@ -208,43 +199,39 @@ class Scores:
 
 def scores_of(library: Library, fit: Fitted) -> Scores:
     """Given what the model holds by now, its scales and its noise: one linear step."""
-    pulls, inside, grams, lost = [], [], [], []
+    shown: list[dict[Candidate, tuple[np.ndarray, ...]]] = []  # by trial
     for t, piece in enumerate(fit.pieces):
-        with_right, with_columns, own = library.products(fit, t)
-        pulls.append(with_right - fit.mean[piece.used] @ with_columns)
-        alone, together = (x @ with_columns for x in fit.solution.roots(t))
-        inside.append(together)
-        grams.append(own)
-        lost.append({c: alone[:, s].T @ alone[:, s] for c, s in library.parts[t].items()})
+        right, columns, own = library.products(fit, t)
+        pull = right - fit.mean[piece.used] @ columns
+        alone, together = (x @ columns for x in fit.solution.roots(t))
+        mine = library.parts[t].items()
+        shown.append(
+            {c: (pull[s], together[:, s], own[c], alone[:, s].T @ alone[:, s]) for c, s in mine}
+        )
     count = len(library.places)
     log_factor = np.empty(count)
     sizes, known = [np.zeros(0)] * count, [np.zeros(0)] * count
     saved: list[dict[Effect, list[float]]] = [{} for _ in fit.pieces]
-    for width, mine in library.widths.items():
-        pull, taken = np.zeros((len(mine), width)), np.zeros((len(mine), len(inside[0]), width))
-        whole, gone = np.zeros((2, len(mine), width, width))
-        for n, k in enumerate(mine):
-            place = library.places[k]
-            for t in place.trials:
-                part = library.parts[t][place.candidate]
-                pull[n] += pulls[t][part]
-                taken[n] += inside[t][:, part]
-                whole[n] += grams[t][place.candidate]
-                gone[n] += lost[t][place.candidate]
+    sums = [
+        [np.sum(x, axis=0) for x in zip(*(shown[t][p.candidate] for t in p.trials), strict=True)]
+        for p in library.places
+    ]
+    widths = np.array([len(pull) for pull, *_ in sums])
+    for width in np.unique(widths):  # all of as many free parameters at once
+        numbers = np.flatnonzero(widths == width).tolist()
+        pull, taken, whole, gone = map(np.array, zip(*(sums[k] for k in numbers), strict=True))
         information = whole - gone - taken.swapaxes(1, 2) @ taken
         values, vectors = np.linalg.eigh(information)
         least = 1e-9 * np.trace(whole, axis1=1, axis2=2) + 1e-300  # less is rounding
         values = np.maximum(values, least[:, None])
         along = np.einsum("nki,nk->ni", vectors, pull)
-        added = values[:, None] + 1 / BEFORE[:, None] ** 2
-        gains = 0.5 * (along[:, None] ** 2 / added).sum(axis=2)
-        gains -= 0.5 * np.log(added * BEFORE[:, None] ** 2).sum(axis=2)
-        log_factor[mine] = logsumexp(gains, axis=1) - np.log(len(BEFORE))
-        best = added[np.arange(len(mine)), np.argmax(gains, axis=1)]
+        gains = log_factors(values, along, BEFORE)
+        log_factor[numbers] = logsumexp(gains, axis=1) - np.log(len(BEFORE))
+        best = values + 1 / BEFORE[np.argmax(gains, axis=1), None] ** 2
         likeliest = np.einsum("nki,ni->nk", vectors, along / best)
         determined = values > 1.0  # of which the recording shows a typical size
         squares = (along**2 / values * determined).sum(axis=1)
-        for n, k in enumerate(mine):
+        for n, k in enumerate(numbers):
             sizes[k], known[k], place = likeliest[n], information[n], library.places[k]
             if len(place.trials) == 1 and determined[n].any():
                 ratio = float(squares[n] / _MEDIANS[int(determined[n].sum())])
@@ -252,6 +239,25 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
     medians = [[float(np.median(x)) for x in one.values()] or [1.0] for one in saved]
     inflation = np.array([max(1.0, float(np.median(one))) for one in medians])
     return Scores(log_factor, tuple(sizes), tuple(known), inflation)
+
+
+def log_factors(values: np.ndarray, along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """(..., S) logarithms of the Bayes factors that k numbers are there, of S standard deviations
+    before the data, from the eigenvalues (..., k) of their precision and their pull along its
+    eigenvectors (..., k)."""
+    added = values[..., None, :] + 1 / sizes[:, None] ** 2
+    gains = along[..., None, :] ** 2 / added - np.log(added * sizes[:, None] ** 2)
+    return np.asarray(0.5 * gains.sum(axis=-1))
+
+
+def smallest(shares: Mapping[Key, float], least: float) -> Iterator[Key]:
+    """The fewest, the likeliest first, that hold as much probability."""
+    held = 0.0
+    for key, share in sorted(shares.items(), key=lambda one: -one[1]):
+        yield key
+        held += share
+        if held >= least:
+            return
 
 
 # --- how small each fault might have been and still been named ------------------------------------

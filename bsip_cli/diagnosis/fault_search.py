@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from bsip_cli.diagnosis.fault_model import Fitted, corrected, fitted, refined, sized
-from bsip_cli.diagnosis.fault_scores import Kind, Library, Scores, scores_of
+from bsip_cli.diagnosis.fault_model import Fitted, Hypothesis, corrected, fitted, refined, sized
+from bsip_cli.diagnosis.fault_scores import Kind, Library, Scores, scores_of, smallest
 from bsip_cli.diagnosis.held_out import unevenness
-from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.nameless import UNEXPLAINED, Course, Mean
 
@@ -57,14 +56,13 @@ class Verdict:
 
     number : in the fit. members : what it may be, with probabilities, the likeliest first; they
     hold at least the probability that was asked for. others : what it hardly is, with
-    probabilities. probability : that any of all these is there. without : the fit without it.
+    probabilities. probability : that any of all these is there.
     """
 
     number: int
     members: tuple[tuple[Tried, float], ...]
     others: tuple[tuple[Hypothesis, float], ...]
     probability: float
-    without: Fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +85,25 @@ def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()
         if not tried or tried[0].log_odds < 0:
             break
         fit = corrected(fitted(library.session, tried[0].fit.faults, start=tried[0].fit))
-        fit = _unnamed_if_uneven(library, fit)
+        if _can_be_uneven(fit.faults[-1]):  # is it likelier of another size in every second?
+            inflation = scores_of(library, fit).inflation
+            log = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
+            fit = fit if log < 0 else _unnamed(fit)
     fit, verdicts = _judged(library, fit, named_from, len(known))
-    sure = [one for one in verdicts if one.probability >= named_from]
-    said = {(*x.fault.key, x.fault.trials) for one in sure for x, _ in one.members}
     hardly = [(one.fault, float(expit(one.log_odds))) for one in tried]
+    said = set()
     for verdict in verdicts:
-        unsure = [] if verdict in sure else [(x.fault, p) for x, p in verdict.members]
-        hardly += [*unsure, *verdict.others]
+        members = [(x.fault, p) for x, p in verdict.members]
+        if verdict.probability >= named_from:
+            said |= {(*one.key, one.trials) for one, _ in members}
+        else:
+            hardly += members
+        hardly += verdict.others
     best: dict[tuple[object, ...], tuple[Hypothesis, float]] = {}
     for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
-        place = (*one.key, one.trials)
-        if place not in said:
+        if (place := (*one.key, one.trials)) not in said:
             best.setdefault(place, (one, probability))
-    return Found(fit, tuple(verdicts), tuple(best.values()), scores_of(library, fit))
+    return Found(fit, verdicts, tuple(best.values()), scores_of(library, fit))
 
 
 def _can_be_uneven(one: Hypothesis) -> bool:
@@ -114,33 +117,25 @@ def _unnamed(fit: Fitted) -> Fitted:
     return replace(fit, faults=(*others, replace(last, is_even=False)))
 
 
-def _unnamed_if_uneven(library: Library, fit: Fitted) -> Fitted:
-    """If the last fault is likelier of another size in every second."""
-    if not _can_be_uneven(fit.faults[-1]):
-        return fit
-    inflation = scores_of(library, fit).inflation
-    log = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
-    return fit if log < 0 else _unnamed(fit)
-
-
 def _judged(
     library: Library, fit: Fitted, named_from: float, known: int
-) -> tuple[Fitted, list[Verdict]]:
+) -> tuple[Fitted, tuple[Verdict, ...]]:
     """Each fault given the others; one that is likelier absent goes, the least likely first."""
     while True:
         inflation = scores_of(library, fit).inflation
         numbers = range(known, len(fit.faults))
-        verdicts = [_verdict(library, fit, k, named_from, inflation) for k in numbers]
-        weakest = min(verdicts, key=lambda one: one.probability, default=None)
-        if weakest is None or weakest.probability > 0.5:
-            return fit, verdicts
-        fit = weakest.without
+        found = [_verdict(library, fit, k, named_from, inflation) for k in numbers]
+        weakest = min(found, key=lambda one: one[0].probability, default=None)
+        if weakest is None or weakest[0].probability > 0.5:
+            return fit, tuple(verdict for verdict, _ in found)
+        _, fit = weakest
 
 
 def _verdict(
     library: Library, fit: Fitted, number: int, named_from: float, inflation: np.ndarray
-) -> Verdict:
-    """Of the probability that a fault or another in its place is there, the shares of each."""
+) -> tuple[Verdict, Fitted]:
+    """Of the probability that a fault or another in its place is there, the shares of each; and the
+    fit without it."""
     one = replace(fit.faults[number], is_even=True)
     others = [other for k, other in enumerate(fit.faults) if k != number]
     without = fitted(fit.session, others, start=fit)
@@ -157,12 +152,12 @@ def _verdict(
         for key, x in mine.items():
             if x.fault.name == UNEXPLAINED:
                 mine[key] = replace(x, log_odds=x.log_odds - np.log(library.prior_odds))
-    weighed = [mine.pop(one.key)]
+    itself = mine.pop(one.key)
+    weighed = [itself, *mine.values()]
     if _can_be_uneven(one):
-        (itself,) = weighed
         log = unevenness(itself.fit, len(others), inflation) + np.log(odds)
-        weighed.append(replace(itself, fit=_unnamed(itself.fit), log_odds=itself.log_odds + log))
-    weighed = sorted([*weighed, *mine.values()], key=lambda x: -x.log_odds)
+        weighed.insert(1, replace(itself, fit=_unnamed(itself.fit), log_odds=itself.log_odds + log))
+    weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
     shares: dict[Tried, float] = {}
@@ -170,11 +165,10 @@ def _verdict(
     for each, share in zip(weighed, np.exp(logs - logsumexp(logs)).tolist(), strict=True):
         name = unnamed[0] if each in unnamed else each  # without a name they are all one
         shares[name] = shares.get(name, 0.0) + share
-    ranked = sorted(shares.items(), key=lambda one: -one[1])
-    count = int(np.searchsorted(np.cumsum([x for _, x in ranked]), named_from)) + 1
-    members = tuple((each, share * there) for each, share in ranked[:count])
-    rest = tuple((each.fault, share * there) for each, share in ranked[count:])
-    return Verdict(number, members, rest, there, without)
+    members = tuple((each, shares[each] * there) for each in smallest(shares, named_from))
+    rest = sorted(shares, key=lambda x: -shares[x])[len(members) :]
+    hardly = tuple((each.fault, shares[each] * there) for each in rest)
+    return Verdict(number, members, hardly, there), without
 
 
 def _means_of_nameless(without: Fitted, one: Hypothesis) -> Iterator[Tried]:

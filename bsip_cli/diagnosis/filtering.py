@@ -17,7 +17,7 @@ ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
-FLOOR = 1e-6  # of the noise's power, taken for white
+_FLOOR = 1e-6  # of the noise's power, taken for white
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,40 +41,14 @@ class Filter:
         """(n, 6) of one world wrench (N, 6)."""
         return self(wrench[..., None])[..., 0]
 
-    def innovations(self, columns: np.ndarray, recursion: np.ndarray) -> np.ndarray:
-        """(6 n, k) of filtered columns (n, 6, k), less what a recursion (6, p) makes of what was
-        before; a span's first samples stay as they are."""
-        out = columns.copy()
-        for start, stop in self.spans:
-            for lag in range(1, _ORDER + 1):
-                if stop - start > lag:
-                    earlier = columns[start : stop - lag]
-                    out[start + lag : stop] -= recursion[:, lag - 1, None] * earlier
-        return out.reshape(-1, columns.shape[2])
-
-
-def recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
-    """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
-
-    A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
-    noise, and must not be whitened away.
-    """
-    power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
-    width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
-    smooth = median_filter(power, size=width, mode="reflect")
-    lags = np.fft.irfft(smooth)[: _ORDER + 1]
-    lags[0] *= 1 + floor
-    return solve_toeplitz(lags[:-1], lags[1:])
-
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     """Low-pass and decimation inside the valid intervals, moments about where the person stands."""
     stride = stride_to(scene.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
-    edges = [0, *cuts.tolist(), len(frames)]
-    place, rate_hz = place_of_stance_m(scene), scene.rate_hz / stride
-    return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
+    spans = tuple(pairwise([0, *cuts.tolist(), len(frames)]))
+    return Filter(operator, frames, spans, place_of_stance_m(scene), scene.rate_hz / stride)
 
 
 def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
@@ -84,11 +58,55 @@ def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
     return replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])
 
 
-def every(scene: Scene, enough_hz: float) -> Scene:
-    """The trial at the lowest rate that is enough."""
-    return scene.every(stride_to(scene.rate_hz, enough_hz))
-
-
 def slow(scene: Scene) -> Scene:
     """The trial at the rate at which nuisances and signatures, smooth as they are, are computed."""
-    return scene.once("slow", lambda: every(scene, ENOUGH_HZ), of_readings=True)
+    stride = stride_to(scene.rate_hz, ENOUGH_HZ)
+    return scene.once("slow", lambda: scene.every(stride), of_readings=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What may be left of a trial: an autoregression of innovations of size (6,) and recursion
+    (6, p)."""
+
+    filter: Filter
+    size: np.ndarray
+    recursion: np.ndarray
+
+    def white(self, columns: np.ndarray) -> np.ndarray:
+        """(6 n, k) of filtered columns (n, 6, k), less what the recursion makes of what was before;
+        a span's first samples stay as they are."""
+        columns = columns / self.size[:, None]
+        out = columns.copy()
+        for start, stop in self.filter.spans:
+            for lag in range(1, min(_ORDER, stop - start - 1) + 1):
+                earlier = columns[start : stop - lag]
+                out[start + lag : stop] -= self.recursion[:, lag - 1, None] * earlier
+        return out.reshape(-1, columns.shape[2])
+
+    def white_one(self, wrench: np.ndarray) -> np.ndarray:
+        """(6 n,) of one filtered wrench (n, 6)."""
+        return self.white(wrench[..., None])[:, 0]
+
+
+def noise_like(filter_: Filter, signal: np.ndarray, least: np.ndarray) -> Noise:
+    """Of a signal (n, 6) that may be left of a trial; it is never quieter than ``least`` (6,)."""
+    spread = np.maximum(signal.std(axis=0), least)
+    share = least / spread
+    pairs = zip((signal / spread).T, np.maximum(_FLOOR, share**2), strict=True)
+    recursion = np.stack([_recursion_of(x, filter_.rate_hz, floor) for x, floor in pairs])
+    white = Noise(filter_, spread, recursion).white_one(signal).reshape(-1, 6)
+    return Noise(filter_, spread * np.maximum(white.std(axis=0), share), recursion)
+
+
+def _recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
+    """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
+
+    A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
+    noise, and must not be whitened away.
+    """
+    power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
+    width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
+    lags = np.fft.irfft(median_filter(power, size=width, mode="reflect"))[: _ORDER + 1]
+    lags[0] *= 1 + floor
+    return solve_toeplitz(lags[:-1], lags[1:])

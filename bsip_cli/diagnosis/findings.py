@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from bsip_cli.diagnosis.fault_model import Fitted
+from bsip_cli.diagnosis.fault_model import Fitted, Hypothesis
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut
-from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Judged, Number, Reported, Words
 
 DRAWS = 200
@@ -87,7 +86,7 @@ def _finding(
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
     most = float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
     said = one.name, one.target, tuple(x.name for x in one.in_trials), numbers, words
-    more |= {"scope": one.scope, "rms_change": most}
+    more |= {"scope": one.effect.scope if one.is_even else "trial", "rms_change": most}
     return Finding(*said, 1 - probability, probability, **more)
 
 

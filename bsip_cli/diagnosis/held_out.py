@@ -3,6 +3,7 @@ whether it is of one size throughout."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from bsip_cli.diagnosis.error_model import Session
-from bsip_cli.diagnosis.fault_model import Fitted, columns_of
+from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.normal_equations import Equations, solved
 from bsip_cli.statistics.samples import Z95
 
@@ -71,24 +72,18 @@ class HeldOut:
         """Of a fault given the others: both with and without it, every block is judged by the
         other folds."""
         fit, one = self.fit, self.fit.faults[number]
-        kept = _linear(fit)
-        kept[fit.coefficients(number)] = False
-        offsets = {
-            t: fit.pieces[t].noise.white(columns_of(one, t)[1][..., None])[:, 0] for t in one.trials
-        }
-        without = _means(fit, self.blocks, kept, offsets)
-        saved: list[np.ndarray] = []
-        before = 0.0
+        offsets = {t: fit.pieces[t].noise.white_one(one.columns(t)[1]) for t in one.trials}
+        without = _means(fit, self.blocks, offsets, but=number)
+        saved, before = [], 0.0
         for t in one.trials:
-            piece, fold = fit.pieces[t], self.blocks[t] % FOLDS
-            own = np.ix_(fold, piece.used)
+            piece, blocks = fit.pieces[t], self.blocks[t]
+            own = np.ix_(blocks % FOLDS, piece.used)
             full, fewer = (
                 np.einsum("rk,rk->r", piece.white, x[own]) for x in (self.means, without)
             )
             squares = (piece.right + offsets[t] - fewer) ** 2
             before += float(squares.sum())
-            gone = squares - (piece.right - full) ** 2
-            saved.append(np.bincount(self.blocks[t] - self.blocks[t].min(), gone))
+            saved.append(np.bincount(blocks - blocks.min(), squares - (piece.right - full) ** 2))
         return Gain(np.concatenate(saved), before)
 
 
@@ -96,24 +91,21 @@ def held_out(fit: Fitted) -> HeldOut:
     """Every fifth block of all trials is left out in turn."""
     trials = zip(first_blocks(fit.session), fit.session.trials, strict=True)
     blocks = tuple(np.repeat(first + one.blocks, 6) for first, one in trials)
-    return HeldOut(fit, blocks, _means(fit, blocks, _linear(fit), {}))
-
-
-def _linear(fit: Fitted) -> np.ndarray:
-    """(K,) False for moments, frequencies and windows: without the second that shows them nothing
-    does, so they stay as all seconds have them."""
-    kept = np.ones(len(fit.mean), dtype=bool)
-    for number, one in enumerate(fit.faults):
-        kept[fit.coefficients(number)] = one.is_free
-    return kept
+    return HeldOut(fit, blocks, _means(fit, blocks, {}))
 
 
 def _means(
-    fit: Fitted, blocks: tuple[np.ndarray, ...], kept: np.ndarray, more: dict[int, np.ndarray]
+    fit: Fitted,
+    blocks: tuple[np.ndarray, ...],
+    more: Mapping[int, np.ndarray],
+    but: int | None = None,
 ) -> np.ndarray:
-    """(FOLDS, K) coefficients without each fold, those that are not ``kept`` zero; ``more`` is
-    added to a trial's white residual."""
-    means = np.zeros((FOLDS, len(fit.mean)))
+    """(FOLDS, K) coefficients without each fold, those of a fault zero; ``more`` is added to a
+    trial's white residual. Moments, frequencies and windows stay as all seconds have them: without
+    the second that shows them nothing does."""
+    root, means = fit.root.copy(), np.zeros((FOLDS, len(fit.mean)))
+    for number, one in enumerate(fit.faults):
+        root[fit.coefficients(number)] *= one.is_free & (number != but)
     for fold in range(FOLDS):
         equations = []
         for t, piece in enumerate(fit.pieces):
@@ -121,7 +113,7 @@ def _means(
             white, right = piece.white[rows], (piece.right + offset)[rows]
             against = piece.against + piece.white.T @ offset - white.T @ right
             equations.append(Equations(piece.used, piece.gram - white.T @ white, against))
-        means[fold] = solved(equations, fit.root * kept).mean
+        means[fold] = solved(equations, root).mean
     return means
 
 

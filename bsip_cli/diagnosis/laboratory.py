@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from operator import add
 
 import numpy as np
 from scipy.stats import norm
@@ -27,6 +28,7 @@ from scipy.stats import norm
 from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
+from bsip_cli.diagnosis.fault_scores import log_factors
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.plates import ClockDrift, SyncOffset
@@ -154,13 +156,14 @@ def _laid(
 @dataclass(frozen=True, eq=False)
 class Sums:
     """Precision (C, C) and pull (C,) of the laboratory's sizes by all persons, whose deviations are
-    integrated out; ``log_factor``: of the evidence, that the deviations are of this size."""
+    integrated out, or of some numbers more; ``log_factor``: of the evidence, that the deviations
+    are of this size."""
 
     precision: np.ndarray
     pull: np.ndarray
-    log_factor: float
+    log_factor: float = 0.0
 
-    def with_(self, others: Sums) -> Sums:
+    def __add__(self, others: Sums) -> Sums:
         """And what some others show."""
         return Sums(
             self.precision + others.precision,
@@ -168,12 +171,42 @@ class Sums:
             self.log_factor + others.log_factor,
         )
 
+    def log_factors(self, sizes: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """(S,) logarithm of the Bayes factor that they are there, with these standard deviations
+        before the data, and none of them is larger than ``most`` (k,)."""
+        values, vectors = np.linalg.eigh(self.precision)
+        values, along = np.maximum(values, 0.0), vectors.T @ self.pull
+        added = values + 1 / sizes[:, None] ** 2
+        mean = (along / added) @ vectors.T
+        spread = np.sqrt((1 / added) @ (vectors**2).T)
+        after = _log_within(mean, spread, most).sum(axis=1)
+        before = _log_within(np.zeros_like(mean), sizes[:, None], most).sum(axis=1)
+        return log_factors(values, along, sizes) + after - before
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(k, k) if they are there."""
+        return np.linalg.inv(self.precision + np.eye(len(self.pull)) / SIZES[1] ** 2)
+
+    def drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """(count, k) of them, if they are there."""
+        covariance = self.covariance
+        mean = covariance @ self.pull
+        return rng.multivariate_normal(mean, covariance, count, check_valid="ignore")
+
+
+def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Logarithm of the probability of numbers within +-most, the sign being that of the mean."""
+    far = np.abs(mean)
+    inside, below = norm.logcdf((most - far) / spread), norm.logcdf((-most - far) / spread)
+    return np.asarray(inside + np.log1p(-np.exp(below - inside)))
+
 
 def sums_of(persons: Persons, scale: np.ndarray, who: Iterable[int] | None = None) -> Sums:
     """Of all persons or some; scale (G,) times what is usual: of their deviations."""
     spread, both = scale[persons.groups], persons.both
     blocks = persons.blocks(who)
-    return reduce(Sums.with_, (_sums(j, h, usual * spread, both) for j, h, usual in blocks))
+    return reduce(add, (_sums(j, h, usual * spread, both) for j, h, usual in blocks))
 
 
 def _sums(precision: np.ndarray, pull: np.ndarray, spread: np.ndarray, both: np.ndarray) -> Sums:
@@ -199,45 +232,6 @@ def _deviations(
 
 
 @dataclass(frozen=True, eq=False)
-class Offset:
-    """What is known of k more numbers [typical]: precision (k, k) and pull (k,)."""
-
-    precision: np.ndarray
-    pull: np.ndarray
-
-    def log_factors(self, sizes: np.ndarray, most: np.ndarray) -> np.ndarray:
-        """(S,) logarithm of the Bayes factor that they are there, with these standard deviations
-        before the data, and none of them is larger than ``most`` (k,)."""
-        values, vectors = np.linalg.eigh(self.precision)
-        values, along = np.maximum(values, 0.0), vectors.T @ self.pull
-        added = values + 1 / sizes[:, None] ** 2
-        gains = along**2 / added - np.log(added * sizes[:, None] ** 2)
-        mean = (along / added) @ vectors.T
-        spread = np.sqrt((1 / added) @ (vectors**2).T)
-        after = _log_within(mean, spread, most).sum(axis=1)
-        before = _log_within(np.zeros_like(mean), sizes[:, None], most).sum(axis=1)
-        return np.asarray(0.5 * gains.sum(axis=1) + after - before)
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """(k, k) if they are there."""
-        return np.linalg.inv(self.precision + np.eye(len(self.pull)) / SIZES[1] ** 2)
-
-    def drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """(count, k) of them, if they are there."""
-        covariance = self.covariance
-        mean = covariance @ self.pull
-        return rng.multivariate_normal(mean, covariance, count, check_valid="ignore")
-
-
-def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Logarithm of the probability of numbers within +-most, the sign being that of the mean."""
-    far = np.abs(mean)
-    inside, below = norm.logcdf((most - far) / spread), norm.logcdf((-most - far) / spread)
-    return np.asarray(inside + np.log1p(-np.exp(below - inside)))
-
-
-@dataclass(frozen=True, eq=False)
 class Posterior:
     """Of sizes: mean (C,), covariance (C, C), and the logarithm of the evidence; squares (K,) that
     are expected of the coefficients of what they were before the data."""
@@ -247,14 +241,14 @@ class Posterior:
     log_evidence: float
     squares: np.ndarray
 
-    def offset(self, sums: Sums, directions: np.ndarray) -> Offset:
+    def offset(self, sums: Sums, directions: np.ndarray) -> Sums:
         """What is known of sizes along ``directions`` (C, k) that some persons have on top of this.
 
         sums : of these persons, who are among those that this rests on.
         """
         along = sums.precision @ directions
         precision = directions.T @ along - along.T @ self.covariance @ along
-        return Offset(precision, directions.T @ sums.pull - along.T @ self.mean)
+        return Sums(precision, directions.T @ sums.pull - along.T @ self.mean)
 
 
 def posterior_of(sums: Sums, root: np.ndarray) -> Posterior:
@@ -343,11 +337,6 @@ def _growing_lag(persons: Persons) -> np.ndarray:
     return lag
 
 
-def log_prior_of_scales(scale: np.ndarray) -> float:
-    """Logarithm of their density before the data, less a constant."""
-    return -0.5 * WEIGHT_OF_FAULTS * float((2 * np.log(scale) + 1 / scale**2 - 1).sum())
-
-
 @dataclass(frozen=True, eq=False)
 class Pooled:
     """All that a laboratory's persons show, to be kept: nothing of it grows with their number.
@@ -365,7 +354,7 @@ class Pooled:
 
     def posterior(self) -> Posterior:
         """By all persons."""
-        return posterior_of(Sums(self.precision, self.pull, 0.0), self.root)
+        return posterior_of(Sums(self.precision, self.pull), self.root)
 
     def without(self, own: Sequence[Information]) -> Pooled:
         """By all others: what a person's sessions have added is taken away."""

@@ -12,7 +12,8 @@ from string import ascii_uppercase
 import numpy as np
 from scipy.special import expit, logit, logsumexp
 
-from bsip_cli.diagnosis.fault_scores import BEFORE, named_size
+from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS, log_prior_of_scales
+from bsip_cli.diagnosis.fault_scores import BEFORE, named_size, smallest
 from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
     Persons,
@@ -21,7 +22,6 @@ from bsip_cli.diagnosis.laboratory import (
     Sums,
     alike_in,
     anything,
-    log_prior_of_scales,
     posterior_of,
     scales_of,
     sums_of,
@@ -187,8 +187,9 @@ class Laboratory:
             for times in _TIMES:
                 scale = np.where(touched, times * self.scale, self.scale)
                 sums = sums_of(self.persons, scale)
-                log = posterior_of(sums, anything(self.persons, scale)).log_evidence
-                self._kept[groups].append((sums, log + log_prior_of_scales(scale)))
+                log = log_prior_of_scales(scale, WEIGHT_OF_FAULTS)
+                log += posterior_of(sums, anything(self.persons, scale)).log_evidence
+                self._kept[groups].append((sums, log))
         return self._kept[groups]
 
     @cached_property
@@ -275,16 +276,6 @@ def shares_of(logs: np.ndarray) -> np.ndarray:
     return np.exp(logs - logsumexp([0.0, *logs]))
 
 
-def smallest(shares: Mapping[int, float], least: float) -> Iterator[int]:
-    """The fewest that hold as much probability."""
-    held = 0.0
-    for k, share in sorted(shares.items(), key=lambda one: -one[1]):
-        yield k
-        held += share
-        if held >= least:
-            return
-
-
 def sizes_of(
     drawn: np.ndarray, cause: Cause, log_prior: float, named_from: float, rng: np.random.Generator
 ) -> tuple[Size, ...]:
@@ -333,7 +324,7 @@ def deviations_of(
         parts = (others, sessions) if len(sessions) > 1 else (others,)
         scale = scales_of(persons, *parts, start=lab.scale)
         own = sums_of(persons, scale, sessions)
-        posterior = lab.posterior(sums=sums_of(persons, scale, others).with_(own))
+        posterior = lab.posterior(sums=sums_of(persons, scale, others) + own)
         logs = np.array([one.evidence(posterior, own)[0] for one in causes]) + log_prior
         shares = dict(enumerate(shares_of(logs).tolist()))
         if sum(shares.values()) < named_from:
@@ -352,7 +343,7 @@ def _from_each_on(lab: Laboratory, order: Sequence[int]) -> Iterator[tuple[int, 
     together = None
     for k in range(len(order) - 1, 0, -1):
         own = sums_of(lab.persons, lab.scale, (order[k],))
-        together = own if together is None else together.with_(own)
+        together = own if together is None else together + own
         if k < len(order) - 1:
             yield k, together
 

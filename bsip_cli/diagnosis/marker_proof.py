@@ -16,11 +16,11 @@ from scipy.special import logit
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.error_model import BLOCK_S, Session
+from bsip_cli.diagnosis.fault_model import Hypothesis
 from bsip_cli.diagnosis.fault_scores import Candidate
-from bsip_cli.diagnosis.filtering import every
 from bsip_cli.diagnosis.findings import DRAWS, SCALE_ERROR, Finding, interval_words, numbers_of
 from bsip_cli.diagnosis.held_out import Gain
-from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect, Number, Words
 from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
@@ -94,17 +94,21 @@ def slips_of(
 ) -> tuple[Proof, ...]:
     """The slips that a trial's markers show, of those that were found in them; slides where these
     are likelier than ``named_from``."""
-    fewer = every(scene, ENOUGH_HZ)
+    fewer = scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
     left, found = fewer.residual_m, []
     if left is None:
         return ()
     for slip in slips:
-        p_value = float(chi2.sf(slip.statistic**2, 3))
         effect, scanned = _manner(fewer, left, slip, named_from)
         one = _sized(fewer, left, effect, slip.marker, scanned, rng)
-        one = replace(one, p_value=p_value, share=_own_share(fewer, left, one))
-        if one.share >= OWN and np.linalg.norm(one.values[:3]) >= slip.least_m:
-            found.append(one)
+        m = fewer.person.markers.index(slip.marker)
+        own, change = left[:, m : m + 1], one.left(fewer)[:, m : m + 1]
+        with_means = one.values[3] < fewer.times_s[0]
+        columns, observed, _ = _in_rows(fewer, change[..., None], own, with_means)
+        share = 1 - float(((observed - columns[:, 0]) ** 2).sum() / (observed @ observed))
+        if share >= OWN and np.linalg.norm(one.values[:3]) >= slip.least_m:
+            p_value = float(chi2.sf(slip.statistic**2, 3))
+            found.append(replace(one, p_value=p_value, share=share))
             left = left - one.left(fewer)
     return tuple(found)
 
@@ -118,7 +122,7 @@ def _manner(
     own = residual_m[:, scene.person.markers.index(slip.marker)]
     seen = np.isfinite(own).all(axis=1)
     times_s, own = scene.times_s[seen], own[seen]
-    if _is_throughout(scene, slip.start_s) or np.ptp(times_s) < LEAST_S:
+    if slip.start_s < scene.times_s[0] or np.ptp(times_s) < LEAST_S:
         return at_once
     start, end = ramp_of(times_s, own)
     left = []
@@ -138,15 +142,10 @@ def alone_and_shaken(
     """Slips, and what several markers do within the same second: no tape gives way at six places
     at once, so that is soft tissue after a knock."""
     moments = np.array([one.values[3] for one in slips])
-    together = [
-        not _is_throughout(scene, moment) and (np.abs(moments - moment) < BLOCK_S).sum() > 1
-        for moment in moments
-    ]
-    alone, shaken = (
-        tuple(one for one, is_so in zip(slips, together, strict=True) if is_so == side)
-        for side in (False, True)
-    )
-    return alone, shaken
+    near = (np.abs(moments - moments[:, None]) < BLOCK_S).sum(axis=1)
+    together = (near > 1) & (moments >= scene.times_s[0])
+    pairs = list(zip(slips, together, strict=True))
+    return tuple(one for one, so in pairs if not so), tuple(one for one, so in pairs if so)
 
 
 def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding:
@@ -170,7 +169,7 @@ def bend_of(
 ) -> tuple[Finding, ...]:
     """A second bend of the trunk or soft tissue that moves with it, which markers do not
     distinguish, where that is much of their residuals given slips; nothing where it is little."""
-    fewer = every(scene, ENOUGH_HZ)
+    fewer = scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
     left = fewer.residual_m
     if left is None:
         return ()
@@ -202,13 +201,11 @@ def bend_of(
     return found, replace(tissue, numbers=(Number("size", "m", size),))
 
 
-def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
-    """Part of the squared residual of the marker that is off."""
-    m = scene.person.markers.index(one.target)
-    own, change = residual_m[:, m : m + 1], one.left(scene)[:, m : m + 1]
-    rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
-    columns, observed, _ = rows
-    return 1 - float(((observed - columns[:, 0]) ** 2).sum() / (observed @ observed))
+def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    """(N, m, 3) what an effect that touches markers leaves of them."""
+    change = effect.marker_change(scene, target, values)
+    assert change is not None
+    return change
 
 
 def _sized(
@@ -229,17 +226,11 @@ def _sized(
     null, free = Candidate(effect, target, scanned).null(scene), effect.is_free(scene, target)
     parameters = effect.parameters(scene, target)
     typical, known_to = np.array([(p.typical, p.known_to) for p in parameters]).T
-
-    def values(sizes: np.ndarray) -> np.ndarray:
-        """(K,) of free parameters [typical]."""
-        whole = null.copy()
-        whole[free] = typical[free] * sizes
-        return whole
-
-    shapes = [_left(effect, scene, target, values(one)) for one in np.eye(int(free.sum()))]
+    of_sizes = (np.eye(len(null)) * typical)[free]  # from the free parameters [typical] to all
+    shapes = [_left(effect, scene, target, null + one) for one in of_sizes]
     shown = np.stack(shapes, axis=-1) * effect.is_identifiable(scene, target)
-    throughout = bool(scanned) and _is_throughout(scene, scanned[0])
-    columns, observed, block = _in_rows(scene, shown, residual_m, with_means=throughout)
+    throughout = bool(scanned) and scanned[0] < scene.times_s[0]
+    columns, observed, block = _in_rows(scene, shown, residual_m, throughout)
     mine = [block == number for number in np.unique(block)]
     grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
     rights = np.stack([columns[rows].T @ observed[rows] for rows in mine])
@@ -248,27 +239,17 @@ def _sized(
     noise = float(((observed - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
     prior = noise * np.eye(len(right))
     size = np.linalg.solve(gram + prior, right)
-    left = observed - columns @ size
-    spread = np.hypot((known_to / typical)[free], SCALE_ERROR * size)
     misplaced = _misplaced(shown, residual_m, rng) if throughout else np.zeros((DRAWS, len(size)))
     drawn = _bootstrap(grams, rights, prior, misplaced, rng)
-    draws = np.array([values(one + spread * rng.standard_normal(len(size))) for one in drawn])
+    spread = np.hypot((known_to / typical)[free], SCALE_ERROR * size)
+    noisy = [one + spread * rng.standard_normal(len(size)) for one in drawn]
+    draws = null + noisy @ of_sizes
     for k in np.flatnonzero(~free):  # known as well as it can be
         draws[:, k] += known_to[k] * rng.standard_normal(len(draws))
+    left = observed - columns @ size
     share = 1 - float(left @ left) / float(observed @ observed)
     p_value = float(chi2.sf(size @ gram @ size / noise, len(size)))
-    return Proof(effect, target, values(size), draws, share, p_value)
-
-
-def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-    """(N, m, 3) what an effect that touches markers leaves of them."""
-    change = effect.marker_change(scene, target, values)
-    assert change is not None
-    return change
-
-
-def _is_throughout(scene: Scene, from_s: float) -> bool:
-    return bool(from_s < scene.times_s[0])
+    return Proof(effect, target, null + size @ of_sizes, draws, share, p_value)
 
 
 def _misplaced(shown: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:

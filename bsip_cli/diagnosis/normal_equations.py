@@ -50,23 +50,15 @@ class _Eliminated:
 class Solution:
     """Posterior of coefficients with standard deviations ``root`` (K,) before the data.
 
-    equations : of each trial. shared (S,) : coefficients of several trials; ``factor`` (S, S): the
-    inverse factor of their precision.
+    against (K,) : of all trials. shared (S,) : coefficients of several trials; ``factor`` (S, S):
+    the inverse factor of their precision.
     """
 
-    equations: tuple[Equations, ...]
     root: np.ndarray
+    against: np.ndarray
     trials: tuple[_Eliminated, ...]
     shared: np.ndarray
     factor: np.ndarray
-
-    @cached_property
-    def against(self) -> np.ndarray:
-        """(K,) of all trials."""
-        against = np.zeros(len(self.root))
-        for one in self.equations:
-            against[one.used] += one.against
-        return against
 
     @cached_property
     def mean(self) -> np.ndarray:
@@ -99,8 +91,7 @@ class Solution:
         pulls = [one.inverse @ x[one.used[one.own]] for one in self.trials]
         for one, pull in zip(self.trials, pulls, strict=True):
             left[one.others] -= one.across.T @ pull
-        left = self.factor.T @ (self.factor @ left)
-        found[self.shared] = left
+        found[self.shared] = left = self.factor.T @ (self.factor @ left)
         for one, pull in zip(self.trials, pulls, strict=True):
             found[one.used[one.own]] = one.inverse.T @ (pull - one.across @ left[one.others])
         return self.root[:, None] * found
@@ -118,20 +109,20 @@ class Solution:
 
 def solved(equations: Sequence[Equations], root: np.ndarray) -> Solution:
     """equations : one for each trial. What none of them is about stays as before the data."""
-    times = np.bincount(np.concatenate([one.used for one in equations]), minlength=len(root))
+    times, against = np.zeros(len(root), dtype=int), np.zeros(len(root))
+    for one in equations:
+        times[one.used] += 1
+        against[one.used] += one.against
     (shared,) = np.nonzero(times > 1)
-    place = np.zeros(len(root), dtype=int)
-    place[shared] = np.arange(len(shared))
-    precision = np.eye(len(shared))
-    trials = []
+    precision, trials = np.eye(len(shared)), []
     for one in equations:
         own = times[one.used] == 1
         gram = one.gram * np.outer(root[one.used], root[one.used])
         inverse = _inverse_factor(gram[own][:, own] + np.eye(own.sum()))
-        across, others = inverse @ gram[own][:, ~own], place[one.used[~own]]
+        across, others = inverse @ gram[own][:, ~own], np.searchsorted(shared, one.used[~own])
         precision[np.ix_(others, others)] += gram[~own][:, ~own] - across.T @ across
         trials.append(_Eliminated(one.used, own, inverse, across, others))
-    return Solution(tuple(equations), root, tuple(trials), shared, _inverse_factor(precision))
+    return Solution(root, against, tuple(trials), shared, _inverse_factor(precision))
 
 
 def _inverse_factor(precision: np.ndarray) -> np.ndarray:

@@ -18,21 +18,19 @@ from scipy.ndimage import binary_erosion
 
 from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of
 from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated
-from bsip_cli.diagnosis.fault_model import fitted
-from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.diagnosis.fault_model import Hypothesis, fitted
 from bsip_cli.diagnosis.normal_equations import summed
 from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.frames import Turned
-from bsip_cli.effects.plates import ALL
+from bsip_cli.effects.plates import ALL, Turned
 from bsip_cli.effects.scene import Scene
 
 STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(
     one
     for one in CATALOGUE
-    if one.is_of_laboratory and (one.of_the_forces or isinstance(one, Turned))
+    if one.scope == "laboratory" and (one.of_the_forces or isinstance(one, Turned))
 )
 _MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -58,27 +59,24 @@ class Support:
 
     def finding(self, trial: str) -> Finding:
         """As the diagnosis prints it."""
-        p_value = float(chi2.sf((np.divide(self.force_N, self.error_N) ** 2).sum(), 3))
+        force, errors = np.array(self.force_N), np.array(self.error_N)
+        p_value = float(chi2.sf(((force / errors) ** 2).sum(), 3))
         percent, low, high = self.gain_percent
-        size = float(np.linalg.norm(self.force_N))
-        error = float(np.linalg.norm(np.multiply(self.force_N, self.error_N))) / size
-        parts = zip("xyz", self.force_N, self.error_N, strict=True)
-        rows = [("force", size, error), *((f"force_{axis}", x, e) for axis, x, e in parts)]
-        times = (("start", self.start_s), ("end", self.end_s))
-        return Finding(
-            UnmeasuredContact.name,
-            "+".join(self.hands),
-            (trial,),
-            (
-                *(Number(name, "s", at, at, at) for name, at in times),
-                *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
+        size = float(np.linalg.norm(force))
+        error = float(np.linalg.norm(force * errors)) / size
+        parts = zip(("force_x", "force_y", "force_z"), self.force_N, self.error_N, strict=True)
+        numbers = (
+            Number("start", "s", *[self.start_s] * 3),
+            Number("end", "s", *[self.end_s] * 3),
+            *(
+                Number.within(name, "N", x, Z95 * e)
+                for name, x, e in (("force", size, error), *parts)
             ),
-            Words(f"{self.words()}, and what else may be wrong in this trial is not asked"),
-            p_value,
-            1 - p_value,
-            gain=(percent, low, high),
-            rms_change=size,
         )
+        words = Words(f"{self.words()}, and what else may be wrong in this trial is not asked")
+        said = UnmeasuredContact.name, "+".join(self.hands), (trial,), numbers, words
+        gain = (percent, low, high)
+        return Finding(*said, p_value, 1 - p_value, gain=gain, rms_change=size)
 
     def words(self) -> str:
         """What was found."""
@@ -114,8 +112,7 @@ def held_by(
 ) -> Support | None:
     """The same from the paths (n, 3) of hands and trunk and the force (n, 3) that the plates miss,
     all world."""
-    trunk = _moves_m(trunk_m)
-    moves = {name: _moves_m(path) for name, path in hands_m.items()}
+    trunk, moves = _moves_m(trunk_m), {name: _moves_m(path) for name, path in hands_m.items()}
     still = tuple(h for h, x in moves.items() if x < STILL_M and STILLER * x < trunk)
     counts = np.array([effective_samples(signal) for signal in missing_N.T])
     error = missing_N.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))  # of autocorrelated signals
@@ -125,16 +122,9 @@ def held_by(
     lighter = force[2] > LIGHTER * weight_N and force[2] > SURE * error[2]
     if not still or not (pushed or lighter):
         return None
-    return Support(
-        still,
-        max(moves[hand] for hand in still),
-        trunk,
-        float(times_s[0]),
-        float(times_s[-1]),
-        tuple(force.tolist()),
-        tuple(error.tolist()),
-        _gain(missing_N, times_s).interval(),
-    )
+    largest, (start, *_, end) = max(moves[hand] for hand in still), times_s.tolist()
+    known = tuple(force.tolist()), tuple(error.tolist()), _gain(missing_N, times_s).interval()
+    return Support(still, largest, trunk, start, end, *known)
 
 
 def _moves_m(path_m: np.ndarray) -> float:
@@ -223,36 +213,29 @@ def stated_mass_findings(
     if not is_noticed(share, mass_sd):
         return ()
     p_value = float(2 * norm.sf(abs(share) / mass_sd))  # how likely a scale errs by that much
-    error, extra = mass_sd * mass_kg, share * mass_kg
+    extra, where = share * mass_kg, f"{plate or 'all'} fz"
     found = (
         f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
         f"{'more' if extra > 0 else 'less'} than stated"
     )
-    weight, weight_error = extra * GRAVITY_M_S2, error * GRAVITY_M_S2
-    where = f"{plate or 'all'} fz"
+    per_share = {"kg": mass_kg, "1": 1.0, "N": mass_kg * GRAVITY_M_S2}
+    weight = per_share["N"] * share
     gain = f"the plates' vertical gain is off by {100 * share:+.1f} %"
     zero = f"the plates' zero is off by {weight:+.0f} N"
     causes = [
-        (PlateGain.name, where, "gain", "1", share, mass_sd, gain, "laboratory"),
-        (PlateZero.name, where, "offset", "N", weight, weight_error, zero, "laboratory"),
+        (PlateGain.name, where, "gain", "1", gain, "laboratory"),
+        (PlateZero.name, where, "offset", "N", zero, "laboratory"),
     ]
     if extra > 0:
-        cause = f"{extra:.1f} kg are worn or carried that the stated mass leaves out"
-        causes.insert(0, (AddedMass.name, "", "mass", "kg", extra, error, cause, "person"))
-    return tuple(
-        Finding(
-            effect,
-            target,
-            trials,
-            (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
-            Words(f"{found}: {why}, or the stated mass is wrong", why, found),
-            p_value,
-            (1 - p_value) / (len(causes) + 1),
-            "ambiguous",
-            CLASS,
-            scope,
-            rms_change=abs(weight),
-            closing=f"; to distinguish them, {REMEDY}",
-        )
-        for effect, target, name, unit, x, sd, why, scope in causes
-    )
+        worn = f"{extra:.1f} kg are worn or carried that the stated mass leaves out"
+        causes.insert(0, (AddedMass.name, "", "mass", "kg", worn, "person"))
+    more: dict[str, Any] = {"verdict": "ambiguous", "class_id": CLASS, "rms_change": abs(weight)}
+    more["closing"] = f"; to distinguish them, {REMEDY}"
+    findings = []
+    for effect, target, name, unit, why, scope in causes:
+        size = Number.within(name, unit, per_share[unit] * share, Z95 * per_share[unit] * mass_sd)
+        words = Words(f"{found}: {why}, or the stated mass is wrong", why, found)
+        said = effect, target, trials, (size,), words
+        sure = p_value, (1 - p_value) / (len(causes) + 1)
+        findings.append(Finding(*said, *sure, scope=scope, **more))
+    return tuple(findings)

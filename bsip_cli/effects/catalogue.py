@@ -1,36 +1,15 @@
-"""All effects that a diagnosis considers; a new one is a class and a line here."""
+"""All effects that a diagnosis considers, in the order of ``catalogue.toml``."""
 
 from __future__ import annotations
 
-from bsip_cli.effects import body, frames, joints, loads, markers, plates
-from bsip_cli.effects.effect import Effect
+from bsip_cli.effects import body, loads, markers, plates
+from bsip_cli.effects.effect import ABOUT, Effect
 
-CATALOGUE: tuple[Effect, ...] = (
-    plates.SyncOffset(),
-    plates.ClockDrift(),
-    plates.FrameRate(),
-    plates.PlateTranslation(),
-    plates.PlateRotation(),
-    plates.PlateGain(),
-    plates.PlateCrosstalk(),
-    plates.PlateZero(),
-    plates.PlateDrift(),
-    frames.GravityTilt(),
-    loads.AddedMass(),
-    loads.ReleasedObject(),
-    body.WobblingMass(),
-    body.Breathing(),
-    loads.UnmeasuredContact(),
-    joints.JointCentre(),
-    joints.MissingJoint(),
-    markers.MarkerShift(),
-    markers.MarkerSwap(),
-    markers.OverSmoothing(),
-    body.SegmentInertia(),
-    loads.Implement(),
-    frames.CameraFrame(),
-    loads.ExternalForce(),
-    loads.ObjectHandled(),
-    markers.MarkerSlide(),
-)
+_CLASSES = {
+    one.name: one
+    for family in (body, loads, markers, plates)
+    for one in vars(family).values()
+    if isinstance(one, type) and issubclass(one, Effect) and hasattr(one, "name")
+}
+CATALOGUE: tuple[Effect, ...] = tuple(_CLASSES[name]() for name in ABOUT)
 EFFECTS = {effect.name: effect for effect in CATALOGUE}

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import re
+import tomllib
+from abc import ABC
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 from bsip_cli.effects.scene import Scene
+from bsip_cli.segments import in_words, the_joint
 
+_FILE = Path(__file__).with_name("catalogue.toml")
+ABOUT: dict[str, dict[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 NEAR = 0.01  # of the typical size: so near to a bound counts as at it
 DISAGREEMENT = 0.02  # of the squared residuals of the markers
 
@@ -40,6 +46,7 @@ class Parameter:
     is_given: bool = False
 
 
+Parameters = tuple[Parameter, ...]
 Reported = tuple[tuple[str, str, float], ...]  # name, unit and value of what is printed
 
 
@@ -63,37 +70,47 @@ class Effect(ABC):
     """A cause outside the inertial parameters that changes wrench or markers.
 
     All parameters without a scan vanish together: then there is no effect. One defines ``change``
-    or, if that is linear in these parameters, ``tangent``.
+    or, if that is linear in these parameters, ``tangent``. What is no physics is in the table
+    ``catalogue.toml`` under its name; what a person should read are templates for what ``spoken``
+    knows.
     """
 
     name: ClassVar[str]
     numbers: ClassVar[tuple[Parameter, ...]] = ()  # its parameters, the same in every trial
-    is_of_laboratory: ClassVar[bool] = False  # the same in every trial of a recording session
-    is_of_person: ClassVar[bool] = False  # the same in every trial of a person
+    # How far it reaches: the same in all trials of a laboratory's session, or of a person; or not.
+    scope: ClassVar[str] = "trial"
+    segments: ClassVar[tuple[str, ...]] = ()  # where it may sit: all whose names begin so
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
     of_the_forces: ClassVar[bool] = False  # what is measured is wrong, and can be corrected
     of_the_plates: ClassVar[bool] = False  # so that the truth is what was measured, less the change
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
+    says: ClassVar[str]  # the cause with its sizes
+    shortly: ClassVar[str] = ""  # in fewest words, where fewer are enough
+    orders: ClassVar[tuple[str, str]] = ("more", "less")  # of a first number above and below zero
+    is_signed: ClassVar[bool] = True  # whether ``says`` shows the sign of a number
     looks: ClassVar[str]  # what a person sees of it in the curves
     remedy: ClassVar[str]  # what would separate it from others of its ambiguity group
     least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not reported
 
+    def __init_subclass__(cls) -> None:
+        """With the name of its class, and what the table says of it."""
+        name = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+        for key, value in ({"name": name} | ABOUT[name] if name in ABOUT else {}).items():
+            if key == "numbers":
+                value = [Parameter(**one) for one in value]
+            setattr(cls, key, tuple(value) if isinstance(value, list) else value)
+
     @property
     def is_shared(self) -> bool:
         """Whether trials can share it, with the same numbers."""
-        return self.is_of_laboratory or self.is_of_person
-
-    @property
-    def scope(self) -> str:
-        """How far it reaches, if it is there."""
-        if self.is_of_laboratory:
-            return "laboratory"
-        return "person" if self.is_of_person else "trial"
+        return self.scope != "trial"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""
-        return ("",)
+        if not self.segments:
+            return ("",)
+        return tuple(name for name in scene.bodies if name.startswith(self.segments))
 
     def is_shared_at(self, scene: Scene, target: str) -> bool:
         """Whether a trial has it at a target if the others have."""
@@ -111,13 +128,30 @@ class Effect(ABC):
         """(s,) how far around scanned values a finer search looks; by default typical sizes."""
         return np.array([p.typical for p in self.parameters(scene, target) if p.scan])
 
+    def is_free(self, scene: Scene, target: str) -> np.ndarray:
+        """(K,) True for the parameters without a scan."""
+        return np.array([not p.scan for p in self.parameters(scene, target)])
+
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
         return self.tangent(scene, target, values) @ values[self.is_free(scene, target)]
 
-    @abstractmethod
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        """What a person should read, without interval."""
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(N, 6, k) derivative of ``change`` for the k parameters without a scan.
+
+        By central differences of a thousandth of typical.
+        """
+        steps = 1e-3 * np.diag([p.typical for p in self.parameters(scene, target)])
+        columns = [
+            self.change(scene, target, values + step) - self.change(scene, target, values - step)
+            for step in steps[self.is_free(scene, target)]
+        ]
+        return np.stack(columns, axis=-1) / (2 * np.diag(steps)[self.is_free(scene, target)])
+
+    def signature(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(N, 6, k) the same for typical sizes."""
+        sizes = np.array([p.typical for p in self.parameters(scene, target) if not p.scan])
+        return self.tangent(scene, target, values) * sizes
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray | None:
         """(N, m, 3) what it adds to the residuals of the inverse kinematics [m], segment axes.
@@ -125,15 +159,6 @@ class Effect(ABC):
         A marker's error less what the pose follows of it; None where no marker is touched.
         """
         return None
-
-    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        """What the diagnosis prints; by default the parameters."""
-        parameters = self.parameters(scene, target)
-        return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
-
-    def is_free(self, scene: Scene, target: str) -> np.ndarray:
-        """(K,) True for the parameters without a scan."""
-        return np.array([not p.scan for p in self.parameters(scene, target)])
 
     def is_identifiable(self, scene: Scene, target: str) -> np.ndarray:
         """(k,) True for the parameters without a scan of which the motion can decide anything."""
@@ -147,14 +172,12 @@ class Effect(ABC):
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the values can be true of a body or a lab; at a bound they would go beyond it.
         What is too small to be named cannot."""
-        bounded = tuple(zip(self.parameters(scene, target), values, strict=True))
-        within = all(
-            p.least <= x <= p.most
-            if p.scan
-            else p.least + NEAR * p.typical < x < p.most - NEAR * p.typical
-            for p, x in bounded
-        )
-        return within and all(abs(x) >= self.least_named.get(p.name, 0.0) for p, x in bounded)
+        for p, x in zip(self.parameters(scene, target), values, strict=True):
+            near = 0.0 if p.scan else NEAR * p.typical
+            inside = p.least + near < x < p.most - near or (p.scan and p.least <= x <= p.most)
+            if not inside or abs(x) < self.least_named.get(p.name, 0.0):
+                return False
+        return True
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""
@@ -163,27 +186,30 @@ class Effect(ABC):
         change = self.marker_change(scene, target, values)
         return change is None or explained_share(scene.residual_m, change) > -DISAGREEMENT
 
-    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        """(N, 6, k) derivative of ``change`` for the k parameters without a scan.
-
-        By central differences of a thousandth of typical.
-        """
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        """What the diagnosis prints; by default the parameters."""
         parameters = self.parameters(scene, target)
-        columns = []
-        for k, parameter in enumerate(parameters):
-            if parameter.scan:
-                continue
-            step = np.zeros(len(parameters))
-            step[k] = 1e-3 * parameter.typical
-            ahead = self.change(scene, target, values + step)
-            columns.append((ahead - self.change(scene, target, values - step)) / (2 * step[k]))
-        return np.stack(columns, axis=-1)
+        return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
-    def signature(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        """(N, 6, k) the same for typical sizes."""
-        parameters = self.parameters(scene, target)
-        sizes = np.array([p.typical for p in parameters if not p.scan])
-        return self.tangent(scene, target, values) * sizes
+    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+        """What a person should read, without interval."""
+        known = self.spoken(scene, target, values)
+        short = self.shortly.format(**known)
+        return Words(self.says.format(short=short, **known), short, is_signed=self.is_signed)
+
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        """What the templates may name: parameters and what is reported, in the units that people
+        read; ``size`` and ``order`` of the first; ``length`` of the vector that the first three
+        are; and the target: as it is (``place``), a segment, a joint."""
+        numbers = (
+            *Effect.reported(self, scene, target, values),
+            *self.reported(scene, target, values),
+        )
+        known: dict[str, Any] = {n: readable_unit(n, u)[0] * x for n, u, x in numbers}
+        name, unit, first = numbers[0]
+        known |= {"size": abs(known[name]), "order": self.orders[not first > 0]}
+        known["length"] = readable_unit(name, unit)[0] * np.linalg.norm(values[:3])
+        return known | {"place": target, "segment": in_words(target), "joint": the_joint(target)}
 
 
 def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:
@@ -194,17 +220,21 @@ def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:
     return 1 - after / max(before, 1e-12)
 
 
-def along_xyz(
-    name: str, unit: str, least: float, most: float, typical: float, known_to: float = 0.0
-) -> tuple[Parameter, ...]:
-    """Parameters ``name_x``, ``name_y`` and ``name_z`` that are described alike."""
-    described = (unit, least, most, typical, (), known_to)
-    return tuple(Parameter(f"{name}_{axis}", *described) for axis in "xyz")
+def along_xyz(name: str, unit: str, most: float, typical: float, sd: float = 0.0) -> Parameters:
+    """Parameters ``name_x``, ``name_y`` and ``name_z`` of either sign, known to ``sd``."""
+    return tuple(
+        Parameter(f"{name}_{axis}", unit, -most, most, typical, known_to=sd) for axis in "xyz"
+    )
 
 
 def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:
     """The first three values as ``name_x``, ``name_y`` and ``name_z``."""
     return tuple((f"{name}_{axis}", unit, float(x)) for axis, x in zip("xyz", values, strict=False))
+
+
+def size_and_parts(name: str, unit: str, values: np.ndarray) -> Reported:
+    """The length of the vector that the first three values are, and its parts."""
+    return (name, unit, float(np.linalg.norm(values[:3]))), *parts_xyz(name, unit, values)
 
 
 # --- what is made of an effect --------------------------------------------------------------------
@@ -219,6 +249,11 @@ class Number:
     value: float
     low: float = np.nan
     high: float = np.nan
+
+    @classmethod
+    def within(cls, name: str, unit: str, value: float, half: float) -> Number:
+        """With an interval that reaches as far to either side."""
+        return cls(name, unit, value, value - half, value + half)
 
     def interval(self, is_signed: bool = True) -> str:
         """``1.87 to 2.14°``; without signs as sizes, if zero is not between them."""

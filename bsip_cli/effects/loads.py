@@ -5,16 +5,23 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import product
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.dynamics.ground_wrench import skew
-from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, along_xyz, parts_xyz
+from bsip_cli.effects.body import moved_phi
+from bsip_cli.effects.effect import (
+    Effect,
+    Parameter,
+    Reported,
+    along_xyz,
+    parts_xyz,
+    size_and_parts,
+)
 from bsip_cli.effects.scene import Scene
-from bsip_cli.segments import in_words
 
 WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0)
 MOST_WINDOWS = 30  # side by side; shorter ones are found in part of a window, and refined
@@ -23,8 +30,6 @@ MOST_WINDOWS = 30  # side by side; shorter ones are found in part of a window, a
 # --- fixed to a segment ---------------------------------------------------------------------------
 
 REACH_M = 0.6
-MOMENT_KG_M = 0.05  # a few centimetres: the segment's own frame is known to no less
-MOST_KG = 20.0
 
 
 class AddedMass(Effect):
@@ -37,35 +42,14 @@ class AddedMass(Effect):
     first moment without a mass within reach of the segment is no explanation.
     """
 
-    name = "added_mass"
-    on_its_segment = True
-    numbers = (
-        Parameter("mass", "kg", 0.0, MOST_KG, 0.5),
-        *along_xyz(
-            "moment", "kg m", -REACH_M * MOST_KG, REACH_M * MOST_KG, 0.1, known_to=MOMENT_KG_M
-        ),
-    )
-    looks = "more weight than stated, and forces that go with the acceleration of one segment"
-    remedy = "weigh the person as recorded, and record once without the load"
-    least_named = MappingProxyType({"mass": 0.2})  # less is what the segment may differ by
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return scene.bodies
-
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return scene.once((self.name, target), lambda: self._wrenches(scene, target)) @ values
+        def wrenches() -> np.ndarray:
+            """(N, 6, 4) for 1 kg at the segment's centre of mass, and for a unit of each moment."""
+            mass, *moment = scene.phi_of(target)[:4]
+            moments = scene.wrenches(target) @ moved_phi(np.array(moment) / mass)
+            return np.concatenate([carried(scene, target)[..., None], moments], axis=2)
 
-    @staticmethod
-    def _wrenches(scene: Scene, target: str) -> np.ndarray:
-        """(N, 6, 4) for 1 kg at the segment's centre of mass, and for a unit of each moment."""
-        centre = scene.centre_of(target)
-        columns = [carried(scene, target)]
-        for axis in np.eye(3):  # the wrench is quadratic in the place: this is its exact derivative
-            ahead, behind = (
-                scene.point(target, centre + x).carrying_wrench() for x in (axis, -axis)
-            )
-            columns.append(0.5 * (ahead - behind))
-        return np.stack(columns, axis=2)
+        return scene.once((self.name, target), wrenches) @ values
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """Mass and its position in the segment's axes, from the segment's origin.
@@ -79,11 +63,6 @@ class AddedMass(Effect):
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         within = super().possible(scene, target, values)
         return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        return Words(
-            f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
-        )
 
 
 def carried(scene: Scene, target: str) -> np.ndarray:
@@ -100,19 +79,12 @@ KNOWN_TO_KG = 0.03  # the arm that is relieved springs back, faster than smoothe
 HELD = Parameter("mass", "kg", 0.0, 20.0, 0.5, known_to=KNOWN_TO_KG)
 
 
-def hands(scene: Scene) -> tuple[str, ...]:
-    """What may hold something."""
-    return tuple(s for s in scene.person.skeleton.segments if s.startswith("hand"))
-
-
 class Held(Effect):
     """A point mass at the hand's centre for some of the time."""
 
+    segments = ("hand",)
     on_its_segment = True
     remedy = "stand still with the object and again without"
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return hands(scene)
 
     @abstractmethod
     def held(self, scene: Scene, times: np.ndarray) -> np.ndarray:
@@ -127,11 +99,8 @@ class Held(Effect):
 class ReleasedObject(Held):
     """An object that the person holds at first and lets go."""
 
-    name = "released_object"
-    looks = "the weight falls at one moment, and until then forces go with a hand that speeds up"
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        start, end = float(scene.times_s[0]), float(scene.times_s[-1])
+        start, end = scene.span_s
         first, last = seen_between(scene)
         moments = np.linspace(first, last, int(np.ceil((last - first) / STEP_S)) + 1)
         return HELD, Parameter("release_time", "s", start, end, STEP_S, tuple(moments.tolist()))
@@ -144,20 +113,12 @@ class ReleasedObject(Held):
         first, last = seen_between(scene)
         return super().possible(scene, target, values) and first <= values[1] <= last
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        return Words(
-            f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
-        )
-
 
 class ObjectHandled(Held):
     """An object that the person picks up and puts down again."""
 
-    name = "object_handled"
-    looks = "the weight rises at one moment and falls at another"
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        start, end = float(scene.times_s[0]), float(scene.times_s[-1])
+        start, end = scene.span_s
         between = tuple(np.linspace(start, end, 5)[1:4].tolist())
         return (
             HELD,
@@ -184,19 +145,12 @@ class ObjectHandled(Held):
         seen = first <= start and start + WINDOWS_S[0] <= end <= last
         return seen and super().possible(scene, target, values)
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        mass, start, end = values
-        return Words(
-            f"the {in_words(target)} picks up {mass:.2f} kg at {start:.2f} s and puts it down at "
-            f"{end:.2f} s"
-        )
-
 
 def seen_between(scene: Scene) -> tuple[float, float]:
     """First and last moment of a release that is seen from both sides [s]."""
     times = scene.times_s[scene.valid]
     if not len(times):
-        return float(scene.times_s[0]), float(scene.times_s[-1])
+        return scene.span_s
     seen = max(1, round(min(SEEN_S * scene.rate_hz, SEEN_PART * len(times))))
     return float(times[seen - 1]), float(times[-seen])
 
@@ -226,16 +180,9 @@ class Implement(Effect):
     grip holds anything. In both hands it moves with the mean of them, in the left one's axes.
     """
 
-    name = "implement"
-    is_of_person = True
-    while_moving = True
-    on_its_segment = True
-    looks = "moments that go with the swing of the hands, far larger than their forces"
-    remedy = "weigh what is held and find the point at which it balances; record once without it"
-
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Each hand; and two that could hold the same, never further apart than long."""
-        one = hands(scene)
+        one = super().targets(scene)
         if len(one) != 2 or not scene.valid.any():
             return one
         left, right = (scene.centre(name).position_m for name in one)
@@ -291,15 +238,11 @@ class Implement(Effect):
         parts = parts_xyz("centre", "m", centre_m(values))
         return *sizes, ("inertia", "kg m2", moment * arm), *parts
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        distance = values[1] / values[4]
-        both = "+" in target
-        holding = "both hands hold" if both else f"the {in_words(target)} holds"
-        short = (
-            f"{holding} {values[0] / distance:.2f} kg whose centre is {distance:.2f} m from the "
-            f"{'hands' if both else 'hand'}"
-        )
-        return Words(f"{short}, as of a club or racket", short)
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        known = super().spoken(scene, target, values) | {"distance": values[1] / values[4]}
+        if "+" in target:
+            return known | {"holding": "both hands hold", "hands": "hands"}
+        return known | {"holding": f"the {known['segment']} holds", "hands": "hand"}
 
 
 def centre_m(values: np.ndarray) -> np.ndarray:
@@ -310,7 +253,7 @@ def centre_m(values: np.ndarray) -> np.ndarray:
     return arm / shape * axis
 
 
-def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[int, np.ndarray, np.ndarray]]:
+def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Where hands hold: segment; place (3,) from its joint's origin, its axes; and the turn (3, 3)
     to these from the axes in which the body's centre is given.
 
@@ -321,12 +264,12 @@ def _grips(scene: Scene, held_by: Sequence[str]) -> list[tuple[int, np.ndarray, 
     middle = np.mean([scene.centre(name).position_m for name in held_by], axis=0)
     first = scene.motion.rotation[:, numbers[0]]
     grips = []
-    for i in numbers:
+    for name, i in zip(held_by, numbers, strict=True):
         own = scene.motion.rotation[:, i].swapaxes(1, 2)
         arm = middle - scene.motion.position_m[:, i]
         place = (own @ arm[..., None])[scene.valid, :, 0].mean(axis=0)
         turn = Rotation.from_matrix((own @ first)[scene.valid]).mean().as_matrix()
-        grips.append((i, place, turn))
+        grips.append((name, place, turn))
     return grips
 
 
@@ -351,31 +294,13 @@ class ExternalForce(Effect):
     On a segment's centre of mass, world axes; the plates carry as much less.
     """
 
-    name = "external_force"
-    is_of_person = True
-    while_moving = True
-    on_its_segment = True
-    numbers = along_xyz("force", "N", -800.0, 800.0, 40.0)
-    looks = "the plates lack, or have too much of, one constant force through the whole trial"
-    remedy = "record once without anything that holds or touches the person"
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return scene.bodies
-
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The change is linear in the force."""
         return missing_wrenches(scene, target)
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The force, and its parts along the lab's axes."""
-        return ("force", "N", float(np.linalg.norm(values))), *parts_xyz("force", "N", values)
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        short = (
-            f"something beside the plates pushes on the {in_words(target)} throughout with "
-            f"{np.linalg.norm(values):.0f} N"
-        )
-        return Words(f"{short}, {values[2]:+.0f} N of it upwards", short)
+        return size_and_parts("force", "N", values)
 
 
 SHORTEST_S = 0.7
@@ -392,20 +317,8 @@ class UnmeasuredContact(Effect):
     carry as much less. The point where it truly acts is not estimated.
     """
 
-    name = "unmeasured_contact"
-    on_its_segment = True
-    looks = (
-        "for some seconds the plates lack a force that the motion needs; the balance over"
-        " long times is off too"
-    )
-    remedy = "record without anything in reach"
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        touching = ("lower_torso", "hand_l", "hand_r", "foot_l", "foot_r")
-        return tuple(s for s in scene.person.skeleton.segments if s in touching)
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        start, end = float(scene.times_s[0]), float(scene.times_s[-1])
+        start, end = scene.span_s
         whole = end - start
         fitting = [w for w in WINDOWS_S if w <= 0.8 * whole]
         longest = fitting[-1] if fitting else whole  # a short trial is one window
@@ -413,7 +326,7 @@ class UnmeasuredContact(Effect):
         middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         at, of = EDGE_S / np.sqrt(2), EDGE_S * np.sqrt(2)
         return (
-            *along_xyz("force", "N", -800.0, 800.0, 40.0, known_to=STEADY_N),
+            *along_xyz("force", "N", 800.0, 40.0, STEADY_N),
             Parameter("middle", "s", start, end, 0.25, middles, known_to=at),
             Parameter("length", "s", min(0.2, whole), whole, 0.5, lengths, known_to=of),
         )
@@ -439,13 +352,13 @@ class UnmeasuredContact(Effect):
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The window, and the mean force in it: its size and its parts along the lab's axes."""
-        start, end = _window(values)
-        return (
-            ("start", "s", max(float(start), float(scene.times_s[0]))),
-            ("end", "s", min(float(end), float(scene.times_s[-1]))),
-            ("force", "N", float(np.linalg.norm(values[:3]))),
-            *parts_xyz("force", "N", values),
-        )
+        start, end = (float(x) for x in np.clip(_window(values), *scene.times_s[[0, -1]]))
+        return ("start", "s", start), ("end", "s", end), *size_and_parts("force", "N", values)
+
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        """The whole window, also before and after the trial."""
+        window = dict(zip(("start", "end"), _window(values), strict=True))
+        return super().spoken(scene, target, values) | window
 
     def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """A touch that is whole when the plates begin to measure may have begun long before; the
@@ -464,13 +377,6 @@ class UnmeasuredContact(Effect):
         touching = np.abs(scene.times_s - values[3]) <= values[4] / 2
         seconds = float((touching & scene.valid).sum()) / scene.rate_hz
         return super().possible(scene, target, values) and seconds >= SHORTEST_S
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        start, end = _window(values)
-        return Words(
-            f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the "
-            f"{in_words(target)} with {np.linalg.norm(values[:3]):.0f} N"
-        )
 
 
 def _window(values: np.ndarray) -> tuple[float, float]:

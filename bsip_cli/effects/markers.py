@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
-from bsip_cli.effects.effect import Effect, Parameter, Reported, Words, explained_share, parts_xyz
+from bsip_cli.effects.effect import Effect, Parameter, Reported, explained_share, size_and_parts
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_events import two_levels
 from bsip_cli.segments import mirrored
@@ -46,10 +46,6 @@ class MarkerShift(Effect):
     between both places: ``absorbed`` is the part of the shift that it took.
     """
 
-    name = "marker_shift"
-    looks = "the residual of one marker jumps and stays; the segment's pose jumps with it"
-    remedy = "put the marker back to its place and record the trial again"
-
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Markers whose own residual asks for it."""
         if scene.residual_m is None:
@@ -68,7 +64,7 @@ class MarkerShift(Effect):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         """The moment: throughout, and where the marker's residual changes its level most; where
         none is known, anywhere."""
-        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        first, last = scene.span_s
         residual, m = scene.residual_m, scene.person.markers.index(target)
         if residual is None:
             inside = [float(t) for t in np.arange(first + APART_S, last, APART_S)]
@@ -104,14 +100,13 @@ class MarkerShift(Effect):
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The slip's length and parts; one before the trial counts from its first frame."""
-        size, since = float(np.linalg.norm(values[:3])), float(max(values[3], scene.times_s[0]))
-        return ("shift", "m", size), *parts_xyz("shift", "m", values), ("from_time", "s", since)
+        since = float(max(values[3], scene.times_s[0]))
+        return *size_and_parts("shift", "m", values), ("from_time", "s", since)
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
         late = values[3] > scene.times_s[0]
         since = f"from {values[3]:.1f} s on" if late else "throughout"
-        size = 1000 * np.linalg.norm(values[:3])
-        return Words(f"marker {target} sits {size:.0f} mm from its place {since}")
+        return super().spoken(scene, target, values) | {"since": since}
 
     @staticmethod
     def _directions(scene: Scene, m: int) -> np.ndarray:
@@ -156,13 +151,9 @@ class MarkerSlide(MarkerShift):
     As in ``marker_shift``, but for the ramp: its middle and length.
     """
 
-    name = "marker_slide"
-    looks = "one marker's residual grows steadily for some seconds and stays"
-    remedy = "fasten the marker on dry skin and record the trial again"
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         """The ramp is that which the marker's residual follows best."""
-        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        first, last = scene.span_s
         residual, m = scene.residual_m, scene.person.markers.index(target)
         if residual is None:
             middle, length = 0.5 * (first + last), max(0.5 * (last - first), LEAST_S)
@@ -187,15 +178,7 @@ class MarkerSlide(MarkerShift):
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         """The way's length and parts, and when it begins and ends."""
         start, end = (float(values[3] + side * values[4] / 2) for side in (-1, 1))
-        way = ("way", "m", float(np.linalg.norm(values[:3])))
-        return way, *parts_xyz("way", "m", values), ("start", "s", start), ("end", "s", end)
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        size, half = 1000 * np.linalg.norm(values[:3]), values[4] / 2
-        return Words(
-            f"marker {target} slides {size:.0f} mm along its segment from {values[3] - half:.1f} "
-            f"to {values[3] + half:.1f} s"
-        )
+        return *size_and_parts("way", "m", values), ("start", "s", start), ("end", "s", end)
 
 
 def ramp_of(times_s: np.ndarray, residual_m: np.ndarray) -> tuple[float, float]:
@@ -232,16 +215,11 @@ class MarkerSwap(Effect):
     lie at least twice as near to the other's place in the model as to their own.
     """
 
-    name = "marker_swap"
-    least_named = MappingProxyType({"share": 0.5})  # labels are exchanged or not
-    looks = "residuals of two markers jump by their distance, and jump back at the end"
-    remedy = "look at the labels of the two markers in the recording and exchange them"
-
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return tuple(_mistaken(scene))
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        first, last = scene.span_s
         start, end = _mistaken(scene)[target]
         return (
             Parameter("share", "1", 0.0, 1.5, 1.0),
@@ -270,12 +248,9 @@ class MarkerSwap(Effect):
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return (("start", "s", float(values[1])), ("end", "s", float(values[2])))
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        first, second = target.split("+")
-        return Words(
-            f"markers {first} and {second} bear each other's labels from {values[1]:.2f} to "
-            f"{values[2]:.2f} s"
-        )
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        pair = dict(zip(("first", "second"), target.split("+"), strict=True))
+        return super().spoken(scene, target, values) | pair
 
 
 def _pair(scene: Scene, target: str) -> tuple[int, int]:
@@ -342,12 +317,6 @@ class OverSmoothing(Effect):
     ``share`` is 1 where the cut-off is right.
     """
 
-    name = "over_smoothing"
-    is_of_laboratory = True
-    least_named = MappingProxyType({"share": 0.3})  # less belongs to another cut-off
-    looks = "peaks of the simulated force too low and too wide, in fast movements only"
-    remedy = "export the trial again without the lab's filter"
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         cutoffs = tuple(f for f in CUTOFFS_HZ if CORNER * f < 0.4 * scene.rate_hz)
         most = min(12.0, 0.45 * scene.rate_hz / CORNER)
@@ -378,13 +347,6 @@ class OverSmoothing(Effect):
         """The cut-off whose loss is the share: at low frequencies it falls like the fourth
         power."""
         return (("cutoff", "Hz", float(values[1] * max(values[0], 1e-6) ** -0.25)),)
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        ((_, unit, cutoff),) = self.reported(scene, target, values)
-        return Words(
-            f"the markers were low-passed with a cut-off near {cutoff:.1f} {unit} before they were "
-            "delivered"
-        )
 
 
 def _lost_m(scene: Scene, cutoff_hz: float) -> np.ndarray:

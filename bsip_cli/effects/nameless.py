@@ -10,6 +10,7 @@ with named ones; what an error goes along with is said.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -17,7 +18,7 @@ from scipy.ndimage import median_filter
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.ground_wrench import move_moments
-from bsip_cli.effects.effect import Effect, Parameter, Reported, Words
+from bsip_cli.effects.effect import Effect, Parameter, Reported
 from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
 from bsip_cli.effects.scene import Scene, place_of_stance_m
 
@@ -29,7 +30,7 @@ class Nameless(Effect):
     """An error of unknown cause."""
 
     name = UNEXPLAINED
-    is_of_laboratory = True
+    scope = "laboratory"
     remedy = "look at plates, cables and everything that touches the person, and record again"
 
 
@@ -51,6 +52,10 @@ def signal_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
 class Tone(Nameless):
     """One component that swings at one frequency."""
 
+    says = (
+        "of unknown cause: a swing of {channel} by {amplitude:.1f} {unit}, {frequency:.2f} times "
+        "per second"
+    )
     FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
     LINE, AROUND_HZ, MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 
@@ -97,14 +102,13 @@ class Tone(Nameless):
         waves = np.cos(phase), np.sin(phase)
         return np.stack([in_channel(scene, target, wave) for wave in waves], axis=-1)
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
-        swing = f"a swing of {OF_THE_LAB[target]} by {size}, {values[2]:.2f} times per second"
-        return Words(f"of unknown cause: {swing}")
-
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         amplitude = float(np.hypot(values[0], values[1]))
         return ("amplitude", unit_of(target), amplitude), ("frequency", "Hz", float(values[2]))
+
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        channel = {"channel": OF_THE_LAB[target], "unit": unit_of(target)}
+        return super().spoken(scene, target, values) | channel
 
 
 # What is large of each quantity: from there on its smooth function hardly changes any more.
@@ -127,9 +131,32 @@ ALONG = {
 }
 
 
-class Course(Nameless):
+class OfComponents(Nameless):
+    """Errors of one component, which are said as they are, or of all, as a force and a moment."""
+
+    def sizes(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, float]:
+        """Of each of its components [N, N m]."""
+        raise NotImplementedError
+
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        sizes = self.sizes(scene, target, values)
+        if len(sizes) == 1:
+            return tuple(("error", unit_of(x), size) for x, size in sizes.items())
+        both = np.linalg.norm(np.reshape(list(sizes.values()), (2, 3)), axis=1).tolist()
+        return ("force", "N", both[0]), ("moment", "N m", both[1])
+
+    def spoken(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, Any]:
+        which, quantity = target.split(" by ")
+        what = ("the force", "the moment") if which == _ALL else (OF_THE_LAB[which],)
+        numbers = zip(what, self.reported(scene, target, values), strict=True)
+        errors = (f"{x} by {size:.1f} {unit}" for x, (_, unit, size) in numbers)
+        return {"errors": " and ".join(errors), "along": ALONG.get(quantity, "")}
+
+
+class Course(OfComponents):
     """One component, or all, that errs by a smooth function of one quantity."""
 
+    says = "of unknown cause: an error of {errors} (RMS) that goes along with {along}"
     DEGREE = 4  # of its Legendre polynomials
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
@@ -172,14 +199,6 @@ class Course(Nameless):
         ]
         return np.stack(columns, axis=-1)
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        _, quantity = target.split(" by ")
-        errors, along = _in_words(self.sizes(scene, target, values)), ALONG[quantity]
-        return Words(f"of unknown cause: an error of {errors} (RMS) that goes along with {along}")
-
-    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        return _of_few(self.sizes(scene, target, values))
-
     def sizes(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, float]:
         """Of each of its components, RMS."""
         change = move_moments(self.change(scene, target, values), place_of_stance_m(scene))
@@ -187,12 +206,14 @@ class Course(Nameless):
         return {x: each[CHANNELS.index(x)] for x in self.channels(target)}
 
 
-class Mean(Nameless):
+class Mean(OfComponents):
     """The constant of a `Course`, which nobody would take for a fault of its own: it has no name
-    either. sizes : by which the components vary, each about as large as its mean may be."""
+    either. of : sizes by which the components vary, each about as large as its mean may be."""
 
-    def __init__(self, sizes: Mapping[str, float]) -> None:
-        self.sizes = sizes
+    says = "of unknown cause: a constant error of {errors}"
+
+    def __init__(self, of: Mapping[str, float]) -> None:
+        self.of = of
 
     @staticmethod
     def target_of(course: str) -> str:
@@ -200,33 +221,15 @@ class Mean(Nameless):
         return f"{course.split(' by ')[0]} by mean"
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(x, unit_of(x), -1e3, 1e3, size) for x, size in self.sizes.items())
+        return tuple(Parameter(x, unit_of(x), -1e3, 1e3, size) for x, size in self.of.items())
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         constant = np.zeros((len(scene.times_s), 6))
-        constant[:, [CHANNELS.index(x) for x in self.sizes]] = values
+        constant[:, [CHANNELS.index(x) for x in self.of]] = values
         return move_moments(constant, -place_of_stance_m(scene))
 
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        errors = _in_words(dict(zip(self.sizes, values.tolist(), strict=True)))
-        return Words(f"of unknown cause: a constant error of {errors}")
-
-    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        return _of_few(dict(zip(self.sizes, values.tolist(), strict=True)))
-
-
-def _of_few(sizes: Mapping[str, float]) -> Reported:
-    """One component as it is, all as force and moment."""
-    if len(sizes) == 1:
-        return tuple(("error", unit_of(x), size) for x, size in sizes.items())
-    force, moment = np.linalg.norm(np.reshape(list(sizes.values()), (2, 3)), axis=1).tolist()
-    return ("force", "N", force), ("moment", "N m", moment)
-
-
-def _in_words(sizes: Mapping[str, float]) -> str:
-    what = ("the force", "the moment") if len(sizes) > 1 else map(OF_THE_LAB.__getitem__, sizes)
-    numbers = (f"{size:.1f} {unit}" for _, unit, size in _of_few(sizes))
-    return " and ".join(f"{x} by {number}" for x, number in zip(what, numbers, strict=True))
+    def sizes(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, float]:
+        return dict(zip(self.of, values.tolist(), strict=True))
 
 
 def _quantities(scene: Scene) -> Mapping[str, np.ndarray]:

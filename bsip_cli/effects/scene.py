@@ -112,6 +112,11 @@ class Scene:
         return 1.0 / float(np.median(np.diff(self.times_s)))
 
     @property
+    def span_s(self) -> tuple[float, float]:
+        """Time of the first and the last frame."""
+        return float(self.times_s[0]), float(self.times_s[-1])
+
+    @property
     def mass_kg(self) -> float:
         return float(self.phi[::10].sum())
 
@@ -256,31 +261,28 @@ class Scene:
         centre = self.centre_of_mass_m
         return np.hstack([np.broadcast_to(weight, centre.shape), np.cross(centre, weight)])
 
-    def point(self, segment: str, offset_m: np.ndarray) -> Point:
-        """A point fixed in a segment, ``offset_m`` (3,) from the segment's origin."""
-        i = self.person.skeleton.index(segment)
-        return self.motion.point(i, self.person.origin_in_joint_m[i] + offset_m)
-
     def centre(self, segment: str) -> Point:
         """The centre of mass of a segment."""
-        return self.point(segment, self.centre_of(segment))
-
-    def wrenches(self, segment: int) -> np.ndarray:
-        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter of a body
-        fixed in a segment, about its joint centre."""
-        return self.once(("wrenches", segment), lambda: self.motion.wrenches(segment))
+        mass, *moment = self.phi_of(segment)[:4]
+        return self.motion.point(self.person.skeleton.index(segment), np.array(moment) / mass)
 
     def centre_of(self, segment: str) -> np.ndarray:
         """(3,) centre of mass of a segment from its origin [m]."""
-        i = self.person.skeleton.index(segment)
-        mass, *moment = self.phi_of(i)[:4]
-        return np.array(moment) / mass - self.person.origin_in_joint_m[i]
+        mass, *moment = self.phi_of(segment)[:4]
+        origin = self.person.origin_in_joint_m[self.person.skeleton.index(segment)]
+        return np.array(moment) / mass - origin
 
-    def phi_of(self, segment: int) -> np.ndarray:
+    def wrenches(self, segment: str) -> np.ndarray:
+        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter of a body
+        fixed in a segment, about its joint centre."""
+        i = self.person.skeleton.index(segment)
+        return self.once(("wrenches", segment), lambda: self.motion.wrenches(i))
+
+    def phi_of(self, segment: str) -> np.ndarray:
         """(10,) parameters of a segment about its joint centre; zeros without mass."""
-        bodies = self.person.skeleton.bodies
+        names = self.person.skeleton.body_names
         parameters = self.phi.reshape(-1, 10)
-        return parameters[bodies.index(segment)] if segment in bodies else np.zeros(10)
+        return parameters[names.index(segment)] if segment in names else np.zeros(10)
 
     def length_of(self, segment: str) -> float:
         """Length that scales a segment's inertia [m]."""
@@ -294,19 +296,16 @@ class Scene:
 
     def markers_beyond(self, segment: int) -> list[int]:
         """Numbers of the markers on a segment and on all that hang on it."""
-        return [m for m, s in enumerate(self.person.marker_segments) if s in self.beyond(segment)]
-
-    def beyond(self, segment: int) -> list[int]:
-        """A segment and all that hang on it."""
-        return self.person.skeleton.beyond(segment)
+        beyond = self.person.skeleton.beyond(segment)
+        return [m for m, s in enumerate(self.person.marker_segments) if s in beyond]
 
     def mass_beyond(self, segment: int) -> tuple[float, Point]:
         """Mass [kg] of a segment and all that hang on it, and their common centre of mass."""
+        names = [self.person.skeleton.segments[i] for i in self.person.skeleton.beyond(segment)]
         mass, total = 0.0, np.zeros((2, len(self.times_s), 3))
-        for i in self.beyond(segment):
-            own, *moment = self.phi_of(i)[:4]
-            if own > 0:
-                point = self.motion.point(i, np.array(moment) / own)
+        for name in names:
+            if (own := self.phi_of(name)[0]) > 0:
+                point = self.centre(name)
                 total += own * np.stack([point.position_m, point.acceleration_m_s2])
                 mass += own
         return mass, Point(*(total / mass))

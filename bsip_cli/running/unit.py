@@ -26,7 +26,7 @@ from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
 
 
-@dataclass
+@dataclass(eq=False)
 class Unit:
     """What a stage is handed: it reads, writes and warns through this and nothing else.
 

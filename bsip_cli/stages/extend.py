@@ -22,7 +22,7 @@ from bsip_cli.diagnosis.cause import (
     method_of,
     unseen_change_by,
 )
-from bsip_cli.effects.joints import AXES, MissingJoint, split_torso
+from bsip_cli.effects.body import AXES, MissingJoint, split_torso
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence, gain_sentence

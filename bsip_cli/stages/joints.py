@@ -26,8 +26,8 @@ from bsip_cli.dynamics.joint_moments import (
 from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 from bsip_cli.effects.body import SegmentInertia
-from bsip_cli.effects.frames import GravityTilt, Turned
 from bsip_cli.effects.loads import UnmeasuredContact
+from bsip_cli.effects.plates import GravityTilt, Turned
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import coordinate_information
 from bsip_cli.recordings.contacts import SIDES, FootForces, Reading, foot_forces, plate_noise

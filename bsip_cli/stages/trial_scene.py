@@ -14,8 +14,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
 from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.frames import Turned
-from bsip_cli.effects.plates import ALL, PlateZero
+from bsip_cli.effects.plates import ALL, PlateZero, Turned
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.inverse_kinematics import posed
 from bsip_cli.recordings.plate_wrench import silent_frames
@@ -131,7 +130,9 @@ def causes_here(unit: Unit, plates: Sequence[str], zeroed: Sequence[str] = ()) -
     shared = [
         one
         for one in causes
-        if one.effect.is_of_laboratory and is_corrected(one.effect) and others <= set(one.trials)
+        if one.effect.scope == "laboratory"
+        and is_corrected(one.effect)
+        and others <= set(one.trials)
     ]
     shared = shared if len(others) > 1 else []
     known = {(one.effect.name, one.target) for one in shared}

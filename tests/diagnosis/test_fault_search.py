@@ -9,12 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.fault_model import corrected, fitted
+from bsip_cli.diagnosis.fault_model import Hypothesis, corrected, fitted
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, unevenness
-from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.nameless import NAMELESS, UNEXPLAINED
 from bsip_cli.effects.scene import Scene

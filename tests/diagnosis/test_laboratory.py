@@ -151,7 +151,7 @@ def test_persons_are_a_sum():
     persons = together(drawn(np.random.default_rng(4), {DELAY: 1.0}, 70))
     scale = np.ones(persons.count)
     whole = sums_of(persons, scale)
-    parts = sums_of(persons, scale, range(2)).with_(sums_of(persons, scale, range(2, 70)))
+    parts = sums_of(persons, scale, range(2)) + sums_of(persons, scale, range(2, 70))
     assert np.allclose(whole.precision, parts.precision)
     assert np.allclose(whole.pull, parts.pull)
     assert whole.log_factor == pytest.approx(parts.log_factor)

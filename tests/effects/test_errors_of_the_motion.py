@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.ground_wrench import pinocchio_model, predicted_wrench
-from bsip_cli.effects.joints import BELOW, JointCentre, MissingJoint
+from bsip_cli.effects.body import BELOW, JointCentre, MissingJoint
 from bsip_cli.effects.markers import CORNER, MarkerShift, MarkerSwap, OverSmoothing, step
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import posed, solve_trial

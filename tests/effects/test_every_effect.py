@@ -7,6 +7,7 @@ import pytest
 
 from bsip_cli.effects.body import WobblingMass
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
+from bsip_cli.effects.effect import ABOUT, Effect
 from bsip_cli.effects.nameless import NAMELESS
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import posed
@@ -50,6 +51,12 @@ def scene() -> Scene:
 
 def test_the_catalogue_is_the_vocabulary():
     assert [effect.name for effect in CATALOGUE] == VOCABULARY.split() == list(EFFECTS)
+
+
+def test_the_table_says_only_what_an_effect_has():
+    attributes = Effect.__annotations__.keys()
+    assert all(about.keys() <= attributes for about in ABOUT.values())
+    assert all(type(effect).name == name for name, effect in zip(ABOUT, CATALOGUE, strict=True))
 
 
 @pytest.mark.parametrize("effect", NAMELESS_TOO)
@@ -147,9 +154,7 @@ def test_at_a_bound_it_would_go_beyond(effect, scene):
 
 def test_what_can_last():
     """Faults of the lab and facts of the person are the same in all trials; an event is not."""
-    assert all(
-        effect.is_shared == (effect.is_of_laboratory or effect.is_of_person) for effect in CATALOGUE
-    )
+    assert {effect.scope for effect in CATALOGUE} == {"laboratory", "person", "trial"}
     shared = {name for name, effect in EFFECTS.items() if effect.is_shared}
     assert {"sync_offset", "plate_gain", "joint_centre"} <= shared
     events = {"added_mass", "released_object", "unmeasured_contact", "marker_shift"}

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.effects.frames import CameraFrame
 from bsip_cli.effects.loads import CENTRE_M, ExternalForce, Implement, ObjectHandled, centre_m
+from bsip_cli.effects.plates import CameraFrame
 from bsip_cli.effects.scene import Scene
 from tests.effects.moving_scene import moving, phi_with, rms, standing_still
 
@@ -41,7 +41,7 @@ def test_the_plates_do_not_tell_an_implements_shape():
     np.testing.assert_allclose(others[0], CLUB)
     centres = others[:, 1] / others[:, 4]
     assert centres.min() == pytest.approx(0.5) and centres.max() == pytest.approx(CENTRE_M)
-    place = scene.point("hand_l", scene.centre_of("hand_l"))
+    place = scene.centre("hand_l")
     for other in others:
         mass = other[0] / (other[1] / other[4]) - 1 / 3
         change = Implement().change(scene, "hand_l", other) - one
@@ -51,7 +51,7 @@ def test_the_plates_do_not_tell_an_implements_shape():
 def test_in_both_hands_it_weighs_between_them():
     scene = standing_still()
     assert Implement().targets(scene) == ("hand_l", "hand_r")  # they are at the person's sides
-    points = [scene.point(h, scene.centre_of(h)).position_m[0] for h in ("hand_l", "hand_r")]
+    points = [scene.centre(h).position_m[0] for h in ("hand_l", "hand_r")]
     left = scene.motion.rotation[0, scene.person.skeleton.index("hand_l")]
     x, y, _ = np.mean(points, axis=0) + left @ centre_m(CLUB)
     change = Implement().change(scene, "hand_l+hand_r", CLUB)[10]
@@ -60,7 +60,7 @@ def test_in_both_hands_it_weighs_between_them():
 
 def test_hands_that_touch_throughout_may_hold_one_thing():
     scene = standing_still()
-    apart = [scene.point(h, scene.centre_of(h)).position_m[0] for h in ("hand_l", "hand_r")]
+    apart = [scene.centre(h).position_m[0] for h in ("hand_l", "hand_r")]
     origins = scene.person.origin_in_joint_m.copy()
     right = scene.person.skeleton.index("hand_r")
     turn = scene.motion.rotation[0, right]
@@ -91,7 +91,7 @@ def test_turned_cameras_turn_the_motion_but_not_its_weight():
 
 def test_a_constant_force_is_missing_from_the_plates():
     scene, force = standing_still(), np.array([5.0, -10.0, 60.0])
-    place = scene.point("upper_torso", scene.centre_of("upper_torso")).position_m
+    place = scene.centre("upper_torso").position_m
     change = ExternalForce().change(scene, "upper_torso", force)
     np.testing.assert_allclose(change[:, :3], np.tile(-force, (len(change), 1)))
     np.testing.assert_allclose(change[:, 3:], np.cross(place, -force), atol=1e-9)
@@ -101,7 +101,7 @@ def test_an_object_weighs_between_picking_up_and_putting_down():
     effect, scene = ObjectHandled(), moving()
     change, times = effect.change(scene, "hand_l", np.array([1.5, 2.0, 3.5])), scene.times_s
     held = (times > 2.02) & (times < 3.48)
-    weight = 1.5 * scene.point("hand_l", scene.centre_of("hand_l")).carrying_wrench()
+    weight = 1.5 * scene.centre("hand_l").carrying_wrench()
     np.testing.assert_allclose(change[held], weight[held], atol=1e-9)
     assert not change[(times < 1.98) | (times > 3.52)].any()
     assert effect.possible(scene, "hand_l", np.array([1.5, 2.0, 3.5]))

@@ -152,7 +152,7 @@ def test_an_impact_is_a_change_of_force_within_moments(rise_s, peak, is_impact):
 def test_a_wobbling_mass_is_an_oscillator_on_a_moving_ground(frequency, damping):
     scene, pace = moving(), 2 * np.pi * frequency
     path = place(scene, "thigh_l")
-    ground = scene.point("thigh_l", scene.centre_of("thigh_l")).acceleration_m_s2
+    ground = scene.centre("thigh_l").acceleration_m_s2
 
     def rate(t, state):
         push = np.array([np.interp(t, TIMES, column) for column in ground.T]) - ground[0]

@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.dynamics.ground_wrench import centre_of_pressure, pinocchio_model, predicted_wrench
-from bsip_cli.effects.frames import GravityTilt
 from bsip_cli.effects.plates import (
     ClockDrift,
     FrameRate,
+    GravityTilt,
     PlateCrosstalk,
     PlateDrift,
     PlateGain,

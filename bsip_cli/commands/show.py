@@ -72,7 +72,7 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
     if laboratory.exists():
         table = read_artifact(laboratory, "laboratory")
         yield from map(_wrapped, (*named_sentences(table), *unnamed_sentences(table)))
-    if old := list(_no_more_true(out)):
+    if old := _no_more_true(out):
         yield _listed("\n## Not up to date: run `bsip run` again", old)
     if shared := shared_causes(everybody):
         yield _listed(f"\n## What several participants share\n{_wrapped(SHARED)}", shared)
@@ -170,16 +170,17 @@ def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:
     return [(path.name.removesuffix(ending), read_artifact(path, kind)) for path in paths]
 
 
-def _no_more_true(out: Path) -> Iterator[str]:
-    """Whose report is of other code, or of artifacts that were made anew since."""
+def _no_more_true(out: Path) -> list[str]:
+    """Whose reports are of other code, or of artifacts that were made anew since."""
+    reasons: dict[str, list[str]] = {}
     for folder in sorted(out.glob("sub-*")):
         if (path := _path(folder, "report-files")).exists():
             try:
                 why = outdated(path)
             except BadDataError as error:
                 why = str(error)
-            if why:
-                yield f"{folder.name}: {why}"
+            reasons.setdefault(why.replace(f"{folder.name}_", ""), []).append(folder.name)
+    return [f"{listed(names)}: {why}" for why, names in reasons.items() if why]
 
 
 def _listed(head: str, sentences: Sequence[str]) -> str:

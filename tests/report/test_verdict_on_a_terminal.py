@@ -6,6 +6,7 @@ from unittest.mock import patch
 
 import pandas as pd
 
+from bsip_cli.commands import show
 from bsip_cli.commands.show import shown, verdict_text
 from bsip_cli.report.verdict import corrected_sentence, verdict_of
 from tests.report.fake_study import Artifacts, detection, diagnosis, marker_events
@@ -80,3 +81,13 @@ def test_of_several_people_each_has_a_line(reports):
     assert "sub-01: 2 findings" in text and "sub-02: 2 findings" in text
     assert "Plate 1 is turned" not in text
     assert text.rstrip().endswith("report: " + str(reports.out / "group" / "report.html"))
+
+
+def test_reports_of_other_code_are_told_in_one_line(tmp_path):
+    for name in ("sub-01", "sub-02"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}_report-files.parquet").touch()
+    with patch.object(show, "outdated", lambda path: f"{path.name} was made by other code"):
+        assert show._no_more_true(tmp_path) == [
+            "sub-01 and sub-02: report-files.parquet was made by other code"
+        ]

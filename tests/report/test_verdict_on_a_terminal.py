@@ -89,5 +89,5 @@ def test_reports_of_other_code_are_told_in_one_line(tmp_path):
         (tmp_path / name / f"{name}_report-files.parquet").touch()
     with patch.object(show, "outdated", lambda path: f"{path.name} was made by other code"):
         assert show._no_more_true(tmp_path) == [
-            "sub-01 and sub-02: report-files.parquet was made by other code"
+            "sub-01, sub-02: report-files.parquet was made by other code"
         ]

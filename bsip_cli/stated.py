@@ -279,15 +279,15 @@ def _spoken(cells: Collection[str], title: str) -> list[_Pair]:
     begun = {cell for cell in cells if cell not in _SEX_OF}
     begun = {cell for cell in begun if any(_meaning(cell, pair) for _, pair in _PAIRS)}
     known = {k: words & {w for i, pair in _PAIRS if i == k for w in pair} for k, _ in _PAIRS}
-    whole = [k for k, own in known.items() if own == words]
-    own = [k for k in whole if title.casefold() in _LANGUAGES[k]]
+    speaking = [k for k, its in known.items() if its == words]
+    speaking = speaking or [k for k, its in known.items() if its]
+    of_title = [k for k in speaking if known[k] == words and title.casefold() in _LANGUAGES[k]]
 
     def understanding(languages: Collection[int]) -> list[_Pair]:
         spoken = [pair for k, pair in _PAIRS if k in languages]
         return [pair for pair in spoken if all(_meaning(cell, pair) for cell in begun)]
 
-    some = [k for k, words_of_it in known.items() if words_of_it]
-    pairs = understanding(own) or understanding(whole or some)
+    pairs = understanding(of_title) or understanding(speaking)
     alone = {word for word in words if not word.startswith(tuple(begun))}
     shown = [len(alone & {*pair}) for pair in pairs]
     return [pair for pair, n in zip(pairs, shown, strict=True) if n == max(shown)]

@@ -42,8 +42,8 @@ def findings_about(session: SessionReading) -> list[Finding]:
     """What was decided for all trials of a session alike."""
     plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
     found = (finding for found in plates for finding in found)
-    found_against = _about_those_against(session.against)
-    return [*_about_written(session.written), *_about_frame(session.frame), *found, *found_against]
+    doubts = _about_those_against(session.against)
+    return [*_about_written(session.written), *_about_frame(session.frame), *found, *doubts]
 
 
 def _about_written(written: Written) -> list[Finding]:
@@ -71,10 +71,12 @@ def _about_those_against(trials: tuple[str, ...]) -> list[Finding]:
     """Of the forces that are believed although as many trials contradict them."""
     if not trials:
         return []
-    found = "no more trials agree with this reading of the plates than contradict it: in "
-    found += f"{', '.join(trials)} nothing makes forces and motion one person's"
-    action = "believed it where it makes one; forces and points of force may be wrong there too: "
-    action += "look at the channels and corners of the plates"
+    found = "as many trials contradict how the plates are understood as agree with it: in "
+    found += f"{', '.join(trials)} no reading of them makes forces and motion one person's"
+    action = (
+        "kept the forces of the others, whose sizes and points of force may be wrong too; look "
+    )
+    action += "at the channels and corners of the plates"
     return [Finding("plate_cop", "forces", found, "one reading of all trials", action, "warning")]
 
 

@@ -58,6 +58,17 @@ def test_files_named_in_code_are_there():
             assert (ROOT / name).is_file(), f"{path.name} names {name}"
 
 
+def test_modules_named_on_pages_are_there():
+    modules = {
+        path.name
+        for folder in ("bsip_cli", "tests", "benchmarks")
+        for path in (ROOT / folder).rglob("*.py")
+    }
+    for page in (*DOCS.rglob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        named = re.findall(r"(\w+\.py)\b", text_of(page))
+        assert set(named) <= modules, page.name
+
+
 def test_the_pages_are_short_enough():
     read = [ROOT / "README.md", *DOCS.rglob("*.md")]
     assert sum(len(text_of(page).split()) for page in read) <= MOST_WORDS

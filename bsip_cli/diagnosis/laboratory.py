@@ -23,7 +23,7 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
@@ -198,7 +198,7 @@ class Sums:
 def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
     """Logarithm of the probability of numbers within +-most, the sign being that of the mean."""
     far = np.abs(mean)
-    inside, below = norm.logcdf((most - far) / spread), norm.logcdf((-most - far) / spread)
+    inside, below = log_ndtr((most - far) / spread), log_ndtr((-most - far) / spread)
     return np.asarray(inside + np.log1p(-np.exp(below - inside)))
 
 
@@ -209,14 +209,40 @@ def sums_of(persons: Persons, scale: np.ndarray, who: Iterable[int] | None = Non
     return reduce(add, (_sums(j, h, usual * spread, both) for j, h, usual in blocks))
 
 
+def resampled(
+    persons: Persons, scale: np.ndarray, count: int, rng: np.random.Generator
+) -> list[Sums]:
+    """So many times as many persons, drawn from all with replacement (no ``log_factor``)."""
+    everybody = len(persons.pull)
+    weights = rng.multinomial(everybody, np.full(everybody, 1 / everybody), size=count)
+    precision = np.zeros((count, *persons.precision.shape[1:]))
+    pull = np.zeros((count, persons.pull.shape[1]))
+    first, spread = 0, scale[persons.groups]
+    for j, h, usual in persons.blocks():
+        mine = weights[:, first : (first := first + len(h))]
+        each, pulls, _ = _shown(j, h, usual * spread, persons.both)
+        precision += np.tensordot(mine, each, 1)
+        pull += mine @ pulls
+    return [Sums(*one) for one in zip(precision, pull, strict=True)]
+
+
 def _sums(precision: np.ndarray, pull: np.ndarray, spread: np.ndarray, both: np.ndarray) -> Sums:
+    each, pulls, logs = _shown(precision, pull, spread, both)
+    return Sums(each.sum(axis=0), pulls.sum(axis=0), float(logs.sum()))
+
+
+def _shown(
+    precision: np.ndarray, pull: np.ndarray, spread: np.ndarray, both: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(M, C, C) precision and (M, C) pull of the laboratory's sizes by each person, and (M,) their
+    logarithms of the evidence; spread (M, K) : of the deviations."""
     variance, volume = _deviations(precision, spread, both)
     across, against = precision @ both, pull @ both
     along = np.einsum("mij,mj->mi", variance, against)
-    return Sums(
-        (precision - across @ variance @ across.swapaxes(1, 2)).sum(axis=0),
-        (pull - np.einsum("mij,mj->mi", across, along)).sum(axis=0),
-        0.5 * float((against * along).sum()) - 0.5 * float(volume.sum()),
+    return (
+        precision - across @ variance @ across.swapaxes(1, 2),
+        pull - np.einsum("mij,mj->mi", across, along),
+        0.5 * ((against * along).sum(axis=1) - volume),
     )
 
 

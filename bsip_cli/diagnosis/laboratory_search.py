@@ -23,6 +23,7 @@ from bsip_cli.diagnosis.laboratory import (
     alike_in,
     anything,
     posterior_of,
+    resampled,
     scales_of,
     sums_of,
 )
@@ -33,6 +34,7 @@ from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation, PlateZ
 _TIMES = np.geomspace(0.3, 3.0, 5)  # deviations so many times as large as is likeliest
 _MOST = 8  # faults of a laboratory
 _DRAWS = 4000
+_RESAMPLED = 100  # times the persons, to tell faults apart
 _JUDGED = 10  # sessions that are judged with scales of their own
 _RANKS = ("named", "ambiguous", "rejected", "inconclusive")
 
@@ -55,7 +57,8 @@ class Cause:
         """Logarithm of the Bayes factor that some persons have it on top of what is known, and its
         likeliest size before the data [typical]."""
         logs = posterior.offset(sums, self.directions).log_factors(BEFORE, self.most)
-        return float(logsumexp(logs) - np.log(len(BEFORE))), float(BEFORE[int(np.argmax(logs))])
+        mean = float(np.logaddexp.reduce(logs) - np.log(len(BEFORE)))
+        return mean, float(BEFORE[int(np.argmax(logs))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,16 +168,18 @@ class Laboratory:
         differences = self.persons.differences(self.scale)
         return np.column_stack([ordinary, differences, self.alike, *there])
 
-    def sizes(self, k: int, named_from: float, rng: np.random.Generator) -> tuple[Size, ...]:
-        """Of a cause, if it is there: from the posterior over how large the persons' deviations may
-        be, which few persons do not determine."""
+    def sizes(
+        self, k: int, instead: int, named_from: float, rng: np.random.Generator
+    ) -> tuple[Size, ...]:
+        """Of a cause, if it is there, ``instead`` of one that was found or itself: from the
+        posterior over how large the persons' deviations may be, which few do not determine."""
         cause, persons = self.causes[k], self.persons
         touched = persons.groups[persons.numbers[cause.directions.any(axis=1)]]
         others = self.with_other_scales(frozenset(touched.tolist()))
         logs = np.array([log for _, log in others])
         shares = np.exp(logs - logsumexp(logs))
         counts = rng.multinomial(_DRAWS, shares / shares.sum())
-        offsets = [self.posterior(k, sums).offset(sums, cause.directions) for sums, _ in others]
+        offsets = [self.posterior(instead, x).offset(x, cause.directions) for x, _ in others]
         drawn = [x.drawn(int(n), rng) for x, n in zip(offsets, counts, strict=True)]
         return sizes_of(np.concatenate(drawn), cause, self.log_prior[k], named_from, rng)
 
@@ -227,14 +232,17 @@ def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float
     return lab
 
 
-def _log_odds(lab: Laboratory, but: int | None = None) -> dict[int, tuple[float, float]]:
+def _log_odds(
+    lab: Laboratory, but: int | None = None, sums: Sums | None = None
+) -> dict[int, tuple[float, float]]:
     """Of each cause that is not there: logarithm of the odds that it is too, and its likeliest size
-    before the data. ``but`` : a fault that counts as not there."""
-    posterior = lab.posterior(but)
+    before the data. ``but`` : a fault that counts as not there. sums : of others than all."""
+    sums = lab.sums if sums is None else sums
+    posterior = lab.posterior(but, sums)
     found = {}
     for k, cause in enumerate(lab.causes):
         if k == but or k not in lab.found:
-            log, size = cause.evidence(posterior, lab.sums)
+            log, size = cause.evidence(posterior, sums)
             found[k] = (log + float(lab.log_prior[k]), size)
     return found
 
@@ -244,17 +252,18 @@ def verdicts_of(
 ) -> tuple[Verdict, ...]:
     """Of every cause, what is there first."""
     said: dict[int, tuple[str, str, float]] = {}
+    instead: dict[int, int] = {}  # of which fault that was found
     letters = iter(ascii_uppercase)
+    others = resampled(lab.persons, lab.scale, _RESAMPLED, rng)
     for k in lab.found:
-        odds = _log_odds(lab, but=k)
-        each = shares_of(np.array([log for log, _ in odds.values()]))
-        shares = dict(zip(odds, each.tolist(), strict=True))
+        shares = _shares(lab, k, others)
         if shares[k] >= named_from:
             said[k] = ("named", "", shares[k])
         elif sum(shares.values()) >= named_from:
             letter = next(letters)
             for member in smallest(shares, named_from):
                 said.setdefault(member, ("ambiguous", letter, shares[member]))
+                instead.setdefault(member, k)
         else:
             said[k] = ("rejected", "", shares[k])
     rest = _log_odds(lab)
@@ -263,11 +272,25 @@ def verdicts_of(
     found = []
     for k in sorted(said, key=lambda k: (_RANKS.index(said[k][0]), said[k][1], -said[k][2])):
         what, class_id, probability = said[k]
-        sizes = lab.sizes(k, named_from, rng)
+        sizes = lab.sizes(k, instead.get(k, k), named_from, rng)
         if what == "rejected" and all(np.isinf(one.limit) for one in sizes):
             what = "inconclusive"
         found.append(Verdict(lab.causes[k], what, class_id, probability, sizes))
     return tuple(found)
+
+
+def _shares(lab: Laboratory, k: int, others: Sequence[Sums]) -> dict[int, float]:
+    """Probability of each cause in the place of one that was found. That there is one at all is by
+    all persons. Which it is, is the mean over ``others``, persons drawn with replacement: what a
+    model gets wrong, it takes for one of two similar faults as surely as if it were true (bagged
+    posteriors: Huggins and Miller 2023, Bayesian Anal 18)."""
+
+    def shares(sums: Sums) -> np.ndarray:
+        return shares_of(np.array([log for log, _ in _log_odds(lab, k, sums).values()]))
+
+    drawn = np.array([shares(one) for one in others])
+    which = (drawn / drawn.sum(axis=1, keepdims=True)).mean(axis=0)
+    return dict(zip(_log_odds(lab, k), shares(lab.sums).sum() * which, strict=True))
 
 
 def shares_of(logs: np.ndarray) -> np.ndarray:

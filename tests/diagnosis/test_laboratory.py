@@ -108,9 +108,28 @@ def test_intervals_hold_as_often_as_they_say():
     inside = []
     for seed in range(40):
         lab = fitted(drawn(np.random.default_rng(seed), {DELAY: 1.0}, 6))
-        (size,) = verdict(lab, "sync_offset", "").sizes
+        k = [one.effect for one in lab.causes].index(DELAY.effect)
+        (size,) = lab.sizes(k, k, NAMED, np.random.default_rng(0))
         inside.append(size.low < 0.010 < size.high)
     assert 0.85 <= np.mean(inside) <= 1.0
+
+
+def test_of_two_similar_faults_one_is_named_only_where_persons_agree_which():
+    """Eight show a gain or a zero, and all together the gain, also where each other person does
+    not: those who do might as well have been fewer."""
+    gain, zero = VERTICAL, Coordinate("plate_zero", "1 fz", "offset")
+    parameters = tuple(numbers()[one] for one in (gain, zero))
+    both, apart = np.array([1.0, 1.0]), np.array([1.0, -1.0])
+    precision = 20 * np.outer(both, both) + np.outer(apart, apart)
+    for scatter, said in ((0.0, ("named", "rejected")), (1.0, ("ambiguous", "ambiguous"))):
+        told = []
+        for sign in (1, -1) * 4:
+            pull = 20 * both + (0.5 + sign * scatter) * apart
+            told.append(Information((gain, zero), parameters, np.full(2, 2), precision, pull))
+        first, second = verdicts_of(fitted(told), NAMED, np.random.default_rng(0))
+        assert (first.cause.effect, first.said, second.said) == (gain.effect, *said)
+        # as large as the one, if it is in its place
+        assert second.sizes[0].low > 0 or second.said == "rejected"
 
 
 def test_nothing_is_named_where_nothing_is():
@@ -258,7 +277,7 @@ def test_intervals_hold_what_all_persons_have_alike():
         for alike in inside:
             lab = fitted(told, alike)
             k = [(x.effect, x.target) for x in lab.causes].index((VERTICAL.effect, VERTICAL.target))
-            (size,) = lab.sizes(k, NAMED, rng)
+            (size,) = lab.sizes(k, k, NAMED, rng)
             inside[alike] += size.low < VERTICAL_TYPICAL < size.high
     assert inside[ALIKE] >= 9
     assert inside[0.0] <= 7

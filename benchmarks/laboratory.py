@@ -3,7 +3,14 @@
     python -m benchmarks.laboratory POOL [POOL ...] [--table drawn] [--count 4 8] [--write]
 
 POOL: results of `bsip laboratory` for simulated persons of one sound laboratory, whose forces come
-by the simulator's own route. Persons are drawn from them with replacement, and one fault is added
+by the simulator's own route, such as
+
+    bsip simulate study --participants 64 --seed 90210 --task static --task walking \\
+        --soft-tissue measured
+    bsip simulate more --participants 64 --seed 90210 --run 2 --task walking --soft-tissue measured
+    cp -r more/sub-* study; bsip run study --out POOL --until laboratory
+
+Persons are drawn from them with replacement, and one fault is added
 to what they tell: J theta to the pull; to what they tell in motion alone, where trials of who
 stands still are clean. In another kind persons only know as much as those of the pool, and what
 they tell is drawn as the model has it, deviations and all. Tables: ``drawn``, the errors beside the

@@ -169,17 +169,18 @@ class Laboratory:
         return np.column_stack([ordinary, differences, self.alike, *there])
 
     def sizes(
-        self, k: int, instead: int, named_from: float, rng: np.random.Generator
+        self, k: int, named_from: float, rng: np.random.Generator, instead: int | None = None
     ) -> tuple[Size, ...]:
-        """Of a cause, if it is there, ``instead`` of one that was found or itself: from the
-        posterior over how large the persons' deviations may be, which few do not determine."""
+        """Of a cause, if it is there, perhaps ``instead`` of one that was found: from the posterior
+        over how large the persons' deviations may be, which few persons do not determine."""
+        but = k if instead is None else instead
         cause, persons = self.causes[k], self.persons
         touched = persons.groups[persons.numbers[cause.directions.any(axis=1)]]
         others = self.with_other_scales(frozenset(touched.tolist()))
         logs = np.array([log for _, log in others])
         shares = np.exp(logs - logsumexp(logs))
         counts = rng.multinomial(_DRAWS, shares / shares.sum())
-        offsets = [self.posterior(instead, x).offset(x, cause.directions) for x, _ in others]
+        offsets = [self.posterior(but, x).offset(x, cause.directions) for x, _ in others]
         drawn = [x.drawn(int(n), rng) for x, n in zip(offsets, counts, strict=True)]
         return sizes_of(np.concatenate(drawn), cause, self.log_prior[k], named_from, rng)
 
@@ -272,7 +273,7 @@ def verdicts_of(
     found = []
     for k in sorted(said, key=lambda k: (_RANKS.index(said[k][0]), said[k][1], -said[k][2])):
         what, class_id, probability = said[k]
-        sizes = lab.sizes(k, instead.get(k, k), named_from, rng)
+        sizes = lab.sizes(k, named_from, rng, instead.get(k))
         if what == "rejected" and all(np.isinf(one.limit) for one in sizes):
             what = "inconclusive"
         found.append(Verdict(lab.causes[k], what, class_id, probability, sizes))

@@ -109,7 +109,7 @@ def test_intervals_hold_as_often_as_they_say():
     for seed in range(40):
         lab = fitted(drawn(np.random.default_rng(seed), {DELAY: 1.0}, 6))
         k = [one.effect for one in lab.causes].index(DELAY.effect)
-        (size,) = lab.sizes(k, k, NAMED, np.random.default_rng(0))
+        (size,) = lab.sizes(k, NAMED, np.random.default_rng(0))
         inside.append(size.low < 0.010 < size.high)
     assert 0.85 <= np.mean(inside) <= 1.0
 
@@ -277,7 +277,7 @@ def test_intervals_hold_what_all_persons_have_alike():
         for alike in inside:
             lab = fitted(told, alike)
             k = [(x.effect, x.target) for x in lab.causes].index((VERTICAL.effect, VERTICAL.target))
-            (size,) = lab.sizes(k, k, NAMED, rng)
+            (size,) = lab.sizes(k, NAMED, rng)
             inside[alike] += size.low < VERTICAL_TYPICAL < size.high
     assert inside[ALIKE] >= 9
     assert inside[0.0] <= 7

@@ -82,7 +82,9 @@ class Pool:
     """What the pool's persons tell, and laboratories drawn from it."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        facts = [read_header(path, KIND)["provenance"]["facts"] for path in paths]
+        of_all = {path: read_header(path, KIND)["provenance"]["facts"] for path in paths}
+        paths = [path for path, one in of_all.items() if one["sessions"]]  # some show nothing
+        facts = [of_all[path] for path in paths]
         self.told = [information_in(read_artifact(path, KIND)) for path in paths]
         self.mass_sd = [one["mass_sd"] for one in facts]
         corners = facts[0]["sessions"][""]["plates"]
@@ -287,9 +289,9 @@ def cost(paths: Sequence[Path], count: int) -> dict[str, object]:
 
 def _judged_from(paths: Sequence[Path], rng: np.random.Generator) -> None:
     pool = Pool(paths)
-    lab = pool.of(range(len(paths)), rng)
+    lab = pool.of(range(len(pool.told)), rng)
     verdicts_of(lab, pool.named_from, rng)
-    odds, order = pool.options.diagnosis.fault_prior_odds, range(len(paths))
+    odds, order = pool.options.diagnosis.fault_prior_odds, range(len(pool.told))
     deviations_of(lab, odds, pool.named_from, order, rng)
 
 
@@ -311,7 +313,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="into docs/results")
     asked = parser.parse_args()
     paths = [path for out in asked.pool for path in sorted(out.glob(f"sub-*/*_{KIND}.parquet"))]
-    print(f"{machine()}; {len(paths)} persons in the pool", flush=True)
+    print(f"{machine()}; {len(paths)} persons", flush=True)
     found = []
     for row in rows_of(asked, paths):
         found.append(row)

@@ -153,12 +153,15 @@ class Strays:
     com : (n, 3) of the length of a rod with the segment's mass and mean moment of inertia, segment
         axes; NaN where no source was found.
     moments : (n,) of the moments of inertia of a segment of known mass.
+    other : (n, 2) by how much the mass and, along the segment, the centre of mass of another table
+        differ, in the same units.
     outside : why the table does not hold for this person; empty if it does.
     """
 
     mass: np.ndarray
     com: np.ndarray
     moments: np.ndarray
+    other: np.ndarray
     outside: str
 
 
@@ -170,10 +173,12 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
     figures = read_toml(Path(__file__).parent / "tables" / "people.toml")
     sexes = ["M", "F"] if sex == OTHER else [sex]
     spreads = [figures["spread"][one] for one in sexes]
-    com = np.full((len(rows), 3), np.nan)
+    com, other = np.full((len(rows), 3), np.nan), np.zeros((len(rows), 2))
     for i, row in enumerate(rows):
+        other[i, 0] = np.mean([one[row]["mass"][1] for one in spreads])
         if "com" in spreads[0][row]:
             com[i, _ALONG.get(row, 1)] = _sd(spreads, row, "com")
+            other[i, 1] = np.mean([one[row]["com"][1] for one in spreads])
     index, (low, high) = mass_kg / stature_m**2, figures["holds"]["body_mass_index"]
     is_small = stature_m < figures["holds"]["stature_m"][sex]
     more = [_differs(figures, is_small, mass_kg, stature_m, row) for row in rows]
@@ -194,13 +199,15 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
         np.hypot([_sd(spreads, row, "mass") for row in rows], more),
         com,
         np.array([_sd(spreads, row, "moments") for row in rows]),
+        other,
         outside,
     )
 
 
 def _sd(spreads: Sequence[Mapping[str, Any]], row: str, name: str) -> float:
-    """Of people, and of tables where they were compared; the mean variance of the sexes."""
-    return float(np.sqrt(np.mean([np.sum(np.square(one[row][name])) for one in spreads])))
+    """Of people and, about their mean, of two tables; the mean variance of the sexes."""
+    pairs = np.array([one[row][name] for one in spreads])
+    return float(np.sqrt(np.mean(pairs[:, 0] ** 2 + pairs[:, 1] ** 2 / 2)))
 
 
 def _differs(

@@ -30,8 +30,10 @@ class Spread:
         of known mass.
     com_sd_percent : scalar or (n, 3), segment axes: of the length of the rod that has the
         segment's mass and mean moment of inertia.
-    midline_sd_m, left_right_correlation, total_mass_sd_percent, origin_sd_m : as in
-        configs/default.toml.
+    other_table_percent : (n, 2), by how much mass and centre of mass along Y differ in another
+        table, in the same units.
+    midline_sd_m, left_right_correlation, total_mass_sd_percent, origin_sd_m, other_table_sd : as
+        in configs/default.toml.
     """
 
     mass_sd_percent: float | np.ndarray
@@ -41,6 +43,8 @@ class Spread:
     left_right_correlation: float
     total_mass_sd_percent: float
     origin_sd_m: float = 0.0
+    other_table_sd: float = 0.0
+    other_table_percent: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +106,9 @@ def prior_of(
         together[second, first] = shared * _MIRROR
         together[second, second] = np.sqrt(1 - shared**2)
     spread_root = np.linalg.solve(readable, own @ together)
+    if spread.other_table_percent is not None:
+        towards = spread.other_table_sd * _towards(inertias, spread.other_table_percent).ravel()
+        spread_root = _widened(spread_root, np.linalg.solve(readable, towards))
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
     # once the sum of the free masses is known to that
     total = spread_root[::10][~fixed].sum(axis=0)
@@ -122,6 +129,23 @@ def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.nd
     scaled = prior.root.T @ information @ prior.root + np.eye(len(prior.phi))
     slope = prior.root.T @ (right - information @ prior.phi)
     return prior.phi + prior.root @ np.linalg.solve(scaled, slope)
+
+
+def _towards(inertias: tuple[Inertia, ...], other_percent: np.ndarray) -> np.ndarray:
+    """(n, 10) readable parameters of the other table less those of this one; a heavier segment has
+    the heavier tensor too."""
+    found = np.zeros((len(inertias), 10))
+    for row, inertia, (mass, along) in zip(found, inertias, other_percent / 100, strict=True):
+        row[0], row[2] = mass * inertia.mass_kg, along * rod_length_m(inertia)
+        row[4:] = mass * inertia.readable()[4:]
+    return found
+
+
+def _widened(root: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(P, P) root of the covariance root root' + direction direction', near to ``root``."""
+    u = np.linalg.solve(root, direction)
+    squared = u @ u
+    return root + (np.sqrt(1 + squared) - 1) / max(squared, 1e-300) * np.outer(root @ u, u)
 
 
 def _pairs(names: tuple[str, ...], fixed: np.ndarray) -> tuple[tuple[int, ...], ...]:

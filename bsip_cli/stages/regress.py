@@ -37,7 +37,7 @@ def run(unit: Unit) -> None:
     part = (lengths["length_sd_m"] / lengths["length_m"]).fillna(unit.config.scale.length_sd)
     centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in result.inertias])
     com = np.hypot(com, 100 * part.to_numpy()[:, None] * centres)
-    spreads = np.column_stack([strays.mass, com, strays.moments])
+    spreads = np.column_stack([strays.mass, com, strays.moments, strays.other])
     prior = prior_of(result.inertias, person, spread_from(unit, spreads))
     values = np.array([inertia.readable() for inertia in prior.inertias])
     table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))

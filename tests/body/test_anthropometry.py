@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m, strays_of
 from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.people import Inertia, combined, mean_segments
+from tests.blind import second_world
 from tests.body.standing_person import standing
 
 
@@ -185,12 +187,30 @@ def test_centres_are_told_along_limbs_alone():
     told = np.argwhere(np.isfinite(com))
     along = {ROWS[i]: int(axis) for i, axis in told}
     assert along == dict.fromkeys(ROWS[2:], 1) | {"foot": 0}
-    assert com[ROWS.index("arm"), 1] == pytest.approx(np.hypot(1.0, 7.7))  # people and tables
+    assert com[ROWS.index("arm"), 1] == pytest.approx(np.hypot(1.0, 10.9 / 2**0.5))
     assert np.nanmax(com) < 8
 
 
 def test_the_sample_s_mean_person_has_what_people_and_tables_stray_by():
-    assert mass_strays("M", 73.0, 1.741)["thigh"] == pytest.approx(np.hypot(7.0, 9.9), rel=1e-3)
+    tables = 14.1 / 2**0.5
+    assert mass_strays("M", 73.0, 1.741)["thigh"] == pytest.approx(np.hypot(7.0, tables), rel=1e-3)
+
+
+@pytest.mark.parametrize("sex", ["M", "F"])
+def test_the_other_table_s_masses_are_those_of_de_leva(sex):
+    """Over the mean of both, in %; the trunk's in sum."""
+    lines = (Path(second_world.__file__).parent / "de_leva.csv").read_text("utf-8").splitlines()
+    cells = [line.split(",") for line in lines[1:]]
+    leva = {row[1]: float(row[2]) for row in cells if row[0] == sex}
+    trunk = sum(leva[f"{part}_trunk"] for part in ("upper", "middle", "lower"))
+    leva |= {"arm": leva["upper_arm"], "torso": trunk, "pelvis": trunk}
+    dumas = {row: 100 * load_table("dumas2007")[sex, row].mass_fraction for row in ROWS}
+    dumas |= dict.fromkeys(("torso", "pelvis"), dumas["torso"] + dumas["pelvis"])
+    mass, along = strays_of(sex, 73.0, 1.741, ROWS).other.T
+    for row, percent in zip(ROWS, mass, strict=True):
+        a, b = dumas[row], leva[row]
+        assert percent == pytest.approx(200 * (b - a) / (a + b), abs=0.1)
+    assert along[ROWS.index("thigh")] > 0 > along[ROWS.index("shank")]  # 41 and 44 % of the way
 
 
 def test_the_other_sex_lies_between():

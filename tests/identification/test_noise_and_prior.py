@@ -195,3 +195,23 @@ def test_forces_tell_nothing_of_an_origin_off_its_anatomy():
     sure = readable(Estimate(prior.phi, 0 * covariance, ""), prior)
     np.testing.assert_allclose(sure.sd[:, 1:4], 0.008)
     np.testing.assert_allclose(np.delete(sure.sd, (1, 2, 3), axis=1), 0.0, atol=1e-12)
+
+
+def test_people_may_be_of_another_table_in_all_segments_together():
+    """A covariance more, along what the other table differs by; no number of its own changes."""
+    bodies, person = world().prior.inertias, world().person
+    percent = np.zeros((len(bodies), 2))
+    names = list(person.skeleton.body_names)
+    thighs, pelvis = [names.index(f"thigh_{side}") for side in "lr"], names.index("lower_torso")
+    percent[thighs], percent[pelvis] = [14.0, 1.8], [-9.0, 0.0]
+    free = replace(SPREAD, total_mass_sd_percent=1e6)
+    alone = prior_of(bodies, person, free)
+    both = prior_of(bodies, person, replace(free, other_table_percent=percent, other_table_sd=0.5))
+    more = both.root @ both.root.T - alone.root @ alone.root.T
+    values, vectors = np.linalg.eigh(more)
+    assert np.abs(values[:-1]).max() < 1e-9 * values[-1]
+    assert both.white @ both.root == pytest.approx(np.eye(len(more)), abs=1e-6)
+    mass = vectors[::10, -1] * np.sqrt(values[-1])
+    expected = [0.5 * percent[i, 0] / 100 * bodies[i].mass_kg for i in (*thighs, pelvis)]
+    assert np.abs(mass[[*thighs, pelvis]]) == pytest.approx(np.abs(expected), rel=1e-6)
+    assert mass[thighs[0]] * mass[pelvis] < 0 < mass[thighs[0]] * mass[thighs[1]]

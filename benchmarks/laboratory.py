@@ -213,7 +213,11 @@ def judged(
     cause = lab.causes[k]
     number = [one.name for one in cause.parameters].index(fault.parameter)
     typical = cause.parameters[number].typical
-    one = lab.sizes(k, named_from, rng)[number]
+    sizes = lab.sizes(k, named_from, rng)
+    if lab.found.keys() - {k}:  # perhaps in its place: then the size is that without the other
+        said = verdicts_of(lab, named_from, rng)
+        sizes = next(one.sizes for one in said if one.cause is cause)
+    one = sizes[number]
     usual = np.ones(lab.persons.count)
     sums = sums_of(lab.persons, usual)
     alone = replace(lab, found={}, scale=usual, sums=sums)

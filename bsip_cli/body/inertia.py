@@ -6,6 +6,7 @@ Izz``, about the origin of their frame; people read mass, centre of mass and the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,17 +56,12 @@ def from_phi(phi: np.ndarray) -> Inertia:
     if mass == 0.0:
         raise ZeroDivisionError("a body without mass has no centre of mass")
     com = np.asarray(phi[1:4]) / mass
-    tensor = np.empty((3, 3))
-    for (i, j), value in zip(SYMMETRIC, phi[4:], strict=True):
-        tensor[i, j] = tensor[j, i] = value
-    return Inertia(mass, com, tensor - mass * _steiner(com))
+    return Inertia(mass, com, _tensor(SYMMETRIC, phi[4:]) - mass * _steiner(com))
 
 
 def from_readable(values: np.ndarray) -> Inertia:
     """Inverse of :meth:`Inertia.readable`."""
-    tensor = np.empty((3, 3))
-    for (i, j), value in zip(_READABLE, values[4:], strict=True):
-        tensor[i, j] = tensor[j, i] = value
+    tensor = _tensor(_READABLE, values[4:])
     return Inertia(float(values[0]), np.array(values[1:4], dtype=float), tensor)
 
 
@@ -92,15 +88,22 @@ def second_moments(tensor: np.ndarray) -> np.ndarray:
     return 0.5 * np.trace(tensor) * np.eye(3) - tensor
 
 
-def nearest_physical_tensor(tensor: np.ndarray, floor: float = 0.01) -> np.ndarray:
+def nearest_physical_tensor(tensor: np.ndarray) -> np.ndarray:
     """Nearest tensor (Frobenius norm of the second moments) that a body can have.
 
-    No second moment is left below ``floor`` times their sum: the triangle inequality of the
+    No second moment is left below a hundredth of their sum: the triangle inequality of the
     principal moments (Wensing 2018) holds with that margin.
     """
     moments, axes = np.linalg.eigh(second_moments(tensor))
-    lifted = axes @ np.diag(np.maximum(moments, floor * moments.sum())) @ axes.T
+    lifted = axes @ np.diag(np.maximum(moments, 0.01 * moments.sum())) @ axes.T
     return np.trace(lifted) * np.eye(3) - lifted
+
+
+def _tensor(order: Iterable[tuple[int, int]], values: np.ndarray) -> np.ndarray:
+    tensor = np.empty((3, 3))
+    for (i, j), value in zip(order, values, strict=True):
+        tensor[i, j] = tensor[j, i] = value
+    return tensor
 
 
 def _steiner(r: np.ndarray) -> np.ndarray:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_erosion
 from scipy.signal import butter, sosfiltfilt, welch
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.inverse_kinematics import coordinate_covariance, posed
+from bsip_cli.motion.inverse_kinematics import coordinate_covariance, marker_trust, posed
 from bsip_cli.motion.splines import SkinNoise, SmoothSignal, bridged, noise_level, smooth
 
 # --- how much the skin swings against the bones, from the residuals of the inverse kinematics -----
@@ -45,10 +46,8 @@ def skin_corner_hz(
     robust_limit_m : beyond it a marker's pull on the poses fades.
     """
     residuals = posed(person, q).residuals(markers)
-    distance = np.linalg.norm(residuals, axis=2, keepdims=True)
-    weight = np.minimum(1.0, robust_limit_m / np.maximum(distance, 1e-12)) ** 2
-    pull = residuals * weight / np.nanmean(weight)  # as the poses feel them
-    seen = np.isfinite(pull[..., 0])
+    trust, seen = marker_trust(residuals, robust_limit_m), np.isfinite(residuals[..., 0])
+    pull = residuals * trust[..., None] / trust[seen].mean()  # as the poses feel them
     pull = pull[:, seen.sum(axis=0) > _SEEN_SHARE * seen.any(axis=1).sum()]
     coordinates = 3 * pull.shape[1]
     free = coordinates - len(person.skeleton.v_names)
@@ -231,12 +230,10 @@ def _on_manifold(
             q[:, part], *found = _angular(s, part)
         else:  # of the base, whose turning is there already
             # velocity and acceleration in its own axes (Pinocchio's spatial ones)
-            u, w = -q[:, part.stop : part.stop + 3], q[:, part.stop + 3 : part.stop + 4]
-            omega, in_body = v[:, turning.stop : turning.stop + 3], []
-            for vectors in (s.first[:, part], s.second[:, part]):
-                t = 2 * np.cross(u, vectors)
-                in_body.append(vectors + w * t + np.cross(u, t))
-            found = [in_body[0], in_body[1] - np.cross(omega, in_body[0]), s.second_sd[:, part]]
+            back = Rotation.from_quat(q[:, part.stop : part.stop + 4]).inv()
+            speed, rate = back.apply(s.first[:, part]), back.apply(s.second[:, part])
+            omega = v[:, turning.stop : turning.stop + 3]
+            found = [speed, rate - np.cross(omega, speed), s.second_sd[:, part]]
         v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 

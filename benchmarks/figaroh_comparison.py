@@ -25,12 +25,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from benchmarks.measure import ROOT, machine, markdown, run_child
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.base_parameters import find_basis
-from bsip_cli.dynamics.ground_wrench import move_moments, predicted_wrench
+from bsip_cli.dynamics.ground_wrench import move_moments, predicted_wrench, rotations_of
 from bsip_cli.identification.base import estimate
 from bsip_cli.identification.problem import Problem, accumulate, even_noise
 from tests.identification.synthetic_identification import motion, recording, world
@@ -63,13 +62,13 @@ def in_base(wrench: np.ndarray, q: np.ndarray) -> np.ndarray:
     """(N, 6) wrench about the world's origin, seen in and about the floating base's frame."""
     about_base = wrench.copy()
     about_base[:, 3:] -= np.cross(q[:, :3], wrench[:, :3])
-    back = np.swapaxes(Rotation.from_quat(q[:, 3:7]).as_matrix(), 1, 2)
+    back = np.swapaxes(rotations_of(q[:, 3:7]), 1, 2)
     return np.concatenate([turned(back, about_base[:, :3]), turned(back, about_base[:, 3:])], 1)
 
 
 def in_world(wrench: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Inverse of :func:`in_base`."""
-    turn = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    turn = rotations_of(q[:, 3:7])
     force, moment = turned(turn, wrench[:, :3]), turned(turn, wrench[:, 3:])
     return np.concatenate([force, moment + np.cross(q[:, :3], force)], 1)
 

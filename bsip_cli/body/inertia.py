@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 UNITS = ("kg", "kg m", "kg m", "kg m", *["kg m2"] * 6)
@@ -72,6 +73,11 @@ def readable_jacobian(phi: np.ndarray) -> np.ndarray:
         difference = from_phi(phi + h * unit).readable() - from_phi(phi - h * unit).readable()
         columns.append(difference / (2 * h))
     return np.stack(columns, axis=1)
+
+
+def readable_jacobians(phi: np.ndarray) -> np.ndarray:
+    """(10 n, 10 n) of n bodies, one after the other."""
+    return block_diag(*map(readable_jacobian, phi.reshape(-1, 10)))
 
 
 def rod_length_m(inertia: Inertia) -> float:

@@ -155,7 +155,8 @@ def _between(c7: np.ndarray, suprasternale: np.ndarray, waist: np.ndarray) -> np
     ahead = suprasternale - c7
     ahead = ahead - (ahead @ up) / (up @ up) * up
     x, y = 0.5 * (_C7 + _SUPRASTERNALE)
-    return middle - float(np.linalg.norm(up)) * x * unit(ahead) - y * up
+    length = float(np.linalg.norm(up))
+    return middle - length * x * ahead / np.linalg.norm(ahead) - y * up
 
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.skeleton import Skeleton
@@ -85,7 +84,9 @@ class Person:
     def joint_rotations(self) -> np.ndarray:
         """(n, 3, 3) rotation of the segment in its parent at angle zero."""
         angles = self.parent_tilt_rad - self.child_tilt_rad
-        return np.asarray(Rotation.from_euler("x", angles[:, None]).as_matrix())
+        c, s, one, zero = np.cos(angles), np.sin(angles), np.ones_like(angles), 0.0 * angles
+        rows = [[one, zero, zero], [zero, c, -s], [zero, s, c]]
+        return np.moveaxis(np.array(rows), -1, 0)
 
     def hinge_axes(self) -> np.ndarray:
         """(n, 3) unit axis of each joint in its own segment (used for hinges)."""

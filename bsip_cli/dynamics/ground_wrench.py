@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
@@ -59,7 +58,7 @@ def wrench_regressor(
     for k in range(len(q)):
         of_all = pin.computeJointTorqueRegressor(model, data, q[k], v[k], a[k])
         rows[k] = of_all[:6, columns]
-    turn = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    turn = rotations_of(q[:, 3:7])
     rows[:, :3] = turn @ rows[:, :3]
     rows[:, 3:] = turn @ rows[:, 3:] + skew(q[:, :3] - reference_m) @ rows[:, :3]
     return rows
@@ -87,6 +86,17 @@ def move_moments(wrench: np.ndarray, reference_m: np.ndarray) -> np.ndarray:
     moved = wrench.copy()
     moved[:, 3:] -= np.cross(reference_m, wrench[:, :3])
     return moved
+
+
+def rotations_of(quaternions: np.ndarray) -> np.ndarray:
+    """(N, 3, 3) rotations of unit quaternions x, y, z, w."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def skew(vectors: np.ndarray) -> np.ndarray:
@@ -162,7 +172,7 @@ def wrench_response(
     # The base's own axes turn and shift with its error.
     parts[0, :, :3, 3:6] -= skew(base[:, :3])
     parts[0, :, 3:, 3:6] -= skew(base[:, 3:])
-    turn = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    turn = rotations_of(q[:, 3:7])
     parts = np.concatenate([turn @ parts[:, :, :3], turn @ parts[:, :, 3:]], axis=2)
     parts[:, :, 3:] += skew(q[:, :3]) @ parts[:, :, :3]
     force = (turn @ base[:, :3, None])[..., 0]

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import SYMMETRIC
-from bsip_cli.dynamics.ground_wrench import skew
+from bsip_cli.dynamics.ground_wrench import rotations_of, skew
 
 UP = np.array([0.0, 0.0, 1.0])
 _FREE = 7  # entries in q of a joint that also shifts
@@ -103,13 +102,10 @@ def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray
         lever = rotation[parent] @ place.translation
         hinge = rotation[parent] @ place.rotation
         entries = q[:, joint.idx_q : joint.idx_q + joint.nq]
-        # which end in a quaternion, or are an angle
-        turn = (
-            Rotation.from_rotvec(entries * free[3:].T)
-            if joint.nq == 1
-            else Rotation.from_quat(entries[:, -4:])
-        )
-        rotation[j] = hinge @ turn.as_matrix()
+        half, turns = 0.5 * entries, entries[:, -4:]  # which end in a quaternion, or are an angle
+        if joint.nq == 1:
+            turns = np.hstack([np.sin(half) * free[3:].T, np.cos(half)])
+        rotation[j] = hinge @ rotations_of(turns)
         speed, rate = (np.split(x[:, own] @ free.T, 2, axis=1) for x in (v, a))
         (linear, spin), (linear_rate, spin_rate) = (
             [(rotation[j] @ part[..., None])[..., 0] for part in parts] for parts in (speed, rate)

@@ -34,7 +34,7 @@ def _cross(a: Array, b: Array, out: Array) -> None:
 
 
 @compiled
-def _rotation_of_quaternion(q: Array | tuple[float, ...], out: Array) -> None:
+def _rotation_of_quaternion(q: Array, out: Array) -> None:
     x, y, z, w = q[0], q[1], q[2], q[3]
     out[0, 0] = 1 - 2 * (y * y + z * z)
     out[0, 1] = 2 * (x * y - z * w)
@@ -65,6 +65,22 @@ def _turn_quaternion(q: Array, omega: Array) -> None:
 
 
 @compiled
+def _hinge_rotation(u: Array, angle: float, out: Array) -> None:
+    """Rotation by an angle about a unit axis (Rodrigues)."""
+    c, s = np.cos(angle), np.sin(angle)
+    for j in range(3):
+        for k in range(3):
+            out[j, k] = (1 - c) * u[j] * u[k]
+        out[j, j] += c
+    out[0, 1] -= s * u[2]
+    out[0, 2] += s * u[1]
+    out[1, 0] += s * u[2]
+    out[1, 2] -= s * u[0]
+    out[2, 0] -= s * u[1]
+    out[2, 1] += s * u[0]
+
+
+@compiled
 def forward(q: Array, tree: Tree, R: Array, p: Array) -> None:
     """Fill R (n, 3, 3) and p (n, 3): orientation of each segment and its joint centre, world."""
     local = np.empty((3, 3))
@@ -77,9 +93,7 @@ def forward(q: Array, tree: Tree, R: Array, p: Array) -> None:
         if tree.kinds[i] == SPHERICAL:
             _rotation_of_quaternion(q[at : at + 4], local)
         else:
-            u, s = tree.axes[i], np.sin(0.5 * q[at])
-            turn = (s * u[0], s * u[1], s * u[2], np.cos(0.5 * q[at]))
-            _rotation_of_quaternion(turn, local)
+            _hinge_rotation(tree.axes[i], q[at], local)
         parent = tree.parents[i]
         Rp, R0 = R[parent], tree.rotations[i]
         for j in range(3):

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_erosion
 from scipy.signal import butter, sosfiltfilt, welch
-from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
@@ -230,10 +229,12 @@ def _on_manifold(
             q[:, part], *found = _angular(s, part)
         else:  # of the base, whose turning is there already
             # velocity and acceleration in its own axes (Pinocchio's spatial ones)
-            back = Rotation.from_quat(q[:, part.stop : part.stop + 4]).inv()
-            speed, rate = back.apply(s.first[:, part]), back.apply(s.second[:, part])
-            omega = v[:, turning.stop : turning.stop + 3]
-            found = [speed, rate - np.cross(omega, speed), s.second_sd[:, part]]
+            u, w = -q[:, part.stop : part.stop + 3], q[:, part.stop + 3 : part.stop + 4]
+            omega, in_body = v[:, turning.stop : turning.stop + 3], []
+            for vectors in (s.first[:, part], s.second[:, part]):
+                t = 2 * np.cross(u, vectors)
+                in_body.append(vectors + w * t + np.cross(u, t))
+            found = [in_body[0], in_body[1] - np.cross(omega, in_body[0]), s.second_sd[:, part]]
         v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 

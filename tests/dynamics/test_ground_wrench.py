@@ -11,6 +11,7 @@ from bsip_cli.dynamics.ground_wrench import (
     move_moments,
     pinocchio_model,
     predicted_wrench,
+    rotations_of,
     skew,
     wrench_regressor,
 )
@@ -127,6 +128,11 @@ def test_moved_moments_are_those_of_the_regressor():
     np.testing.assert_array_equal(about_origin, before)
 
 
-def test_skew():
-    a, b = np.random.default_rng(10).normal(size=(2, 5, 3))
+def test_rotations_and_skew():
+    rng = np.random.default_rng(10)
+    quaternions = rng.normal(size=(5, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    theirs = [pin.Quaternion(one).toRotationMatrix() for one in quaternions]
+    np.testing.assert_allclose(rotations_of(quaternions), theirs, atol=1e-14)
+    a, b = rng.normal(size=(2, 5, 3))
     np.testing.assert_allclose((skew(a) @ b[..., None])[..., 0], np.cross(a, b), atol=1e-14)

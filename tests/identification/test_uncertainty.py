@@ -87,7 +87,7 @@ def test_words(shares, words):
     assert in_words(np.array(shares)) == words
 
 
-# --- bodies that fewer than 1 in 100 people have, told from data that decide a part of them --------
+# --- bodies that fewer than 1 in 100 people have, told from data that decide a part of them -------
 
 
 def estimates(count: int, decided: int, wider: float = 1.0) -> list[Estimate]:

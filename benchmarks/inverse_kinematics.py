@@ -23,8 +23,8 @@ import pinocchio as pin
 from benchmarks.measure import cpu_seconds, interleaved, machine, markdown, run_child
 from benchmarks.moving_person import movement, noisy_markers, sample_person, standing
 from bsip_cli.body.anthropometry import regress
+from bsip_cli.body.exports import model_text
 from bsip_cli.body.exports.identified import IdentifiedPerson
-from bsip_cli.body.exports.osim import osim_text
 from bsip_cli.body.person import Person
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
@@ -96,7 +96,7 @@ def run_opensim(
 def opensim_model(person: Person, joint_family: str) -> str:
     """The model that `bsip export` writes; of the other family with ball and free joints."""
     body = IdentifiedPerson(person, regress(person, "M", 70.0).inertias, "person", "RM", ())
-    document = ET.fromstring(osim_text(body))
+    document = ET.fromstring(model_text("osim", body))
     for joint in document.findall(".//CustomJoint") if joint_family == "ball" else ():
         joint.tag = "FreeJoint" if len(joint.findall("coordinates/*")) == 6 else "BallJoint"
         joint[:] = [part for part in joint if part.tag != "SpatialTransform"]

@@ -182,19 +182,8 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
     index, (low, high) = mass_kg / stature_m**2, figures["holds"]["body_mass_index"]
     is_small = stature_m < figures["holds"]["stature_m"][sex]
     more = [_differs(figures, is_small, mass_kg, stature_m, row) for row in rows]
-    outside = ""
-    if is_small:
-        outside = (
-            f"{stature_m:.2f} m tall, and the table (RM) is of adults: should this be a child, "
-            "the spreads of its masses hold what boys' segments differ from men's by, but no "
-            "figures were found for its centres of mass and tensors"
-        )
-    elif not low <= index <= high:
-        outside = (
-            f"body-mass index {index:.0f} kg/m2, and the table (RM) is of people from {low:g} to "
-            f"{high:g}: the spreads of the masses hold what a regression on mass and stature "
-            "differs from it by, but no figures were found for centres of mass and tensors"
-        )
+    why = "stature" if is_small else "within" if low <= index <= high else "body_mass_index"
+    outside = figures["outside"][why].format(stature_m=stature_m, index=index, low=low, high=high)
     return Strays(
         np.hypot([_sd(spreads, row, "mass") for row in rows], more),
         com,

@@ -6,9 +6,11 @@ Izz``, about the origin of their frame; people read mass, centre of mass and the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 UNITS = ("kg", "kg m", "kg m", "kg m", *["kg m2"] * 6)
@@ -55,17 +57,12 @@ def from_phi(phi: np.ndarray) -> Inertia:
     if mass == 0.0:
         raise ZeroDivisionError("a body without mass has no centre of mass")
     com = np.asarray(phi[1:4]) / mass
-    tensor = np.empty((3, 3))
-    for (i, j), value in zip(SYMMETRIC, phi[4:], strict=True):
-        tensor[i, j] = tensor[j, i] = value
-    return Inertia(mass, com, tensor - mass * _steiner(com))
+    return Inertia(mass, com, _tensor(SYMMETRIC, phi[4:]) - mass * _steiner(com))
 
 
 def from_readable(values: np.ndarray) -> Inertia:
     """Inverse of :meth:`Inertia.readable`."""
-    tensor = np.empty((3, 3))
-    for (i, j), value in zip(_READABLE, values[4:], strict=True):
-        tensor[i, j] = tensor[j, i] = value
+    tensor = _tensor(_READABLE, values[4:])
     return Inertia(float(values[0]), np.array(values[1:4], dtype=float), tensor)
 
 
@@ -76,6 +73,11 @@ def readable_jacobian(phi: np.ndarray) -> np.ndarray:
         difference = from_phi(phi + h * unit).readable() - from_phi(phi - h * unit).readable()
         columns.append(difference / (2 * h))
     return np.stack(columns, axis=1)
+
+
+def readable_jacobians(phi: np.ndarray) -> np.ndarray:
+    """(10 n, 10 n) of n bodies, one after the other."""
+    return block_diag(*map(readable_jacobian, phi.reshape(-1, 10)))
 
 
 def rod_length_m(inertia: Inertia) -> float:
@@ -92,15 +94,22 @@ def second_moments(tensor: np.ndarray) -> np.ndarray:
     return 0.5 * np.trace(tensor) * np.eye(3) - tensor
 
 
-def nearest_physical_tensor(tensor: np.ndarray, floor: float = 0.01) -> np.ndarray:
+def nearest_physical_tensor(tensor: np.ndarray) -> np.ndarray:
     """Nearest tensor (Frobenius norm of the second moments) that a body can have.
 
-    No second moment is left below ``floor`` times their sum: the triangle inequality of the
+    No second moment is left below a hundredth of their sum: the triangle inequality of the
     principal moments (Wensing 2018) holds with that margin.
     """
     moments, axes = np.linalg.eigh(second_moments(tensor))
-    lifted = axes @ np.diag(np.maximum(moments, floor * moments.sum())) @ axes.T
+    lifted = axes @ np.diag(np.maximum(moments, 0.01 * moments.sum())) @ axes.T
     return np.trace(lifted) * np.eye(3) - lifted
+
+
+def _tensor(order: Iterable[tuple[int, int]], values: np.ndarray) -> np.ndarray:
+    tensor = np.empty((3, 3))
+    for (i, j), value in zip(order, values, strict=True):
+        tensor[i, j] = tensor[j, i] = value
+    return tensor
 
 
 def _steiner(r: np.ndarray) -> np.ndarray:

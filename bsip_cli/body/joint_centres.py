@@ -65,10 +65,10 @@ def with_skin(
     hips = 0.5 * (landmarks["hip_centre_l"] + landmarks["hip_centre_r"])
     shoulders = 0.5 * (landmarks["shoulder_centre_l"] + landmarks["shoulder_centre_r"])
     across = landmarks["hip_centre_r"] - landmarks["hip_centre_l"]
-    right = across / np.linalg.norm(across)
+    right = unit(across)
     up = shoulders - hips
     up = up - (up @ right) * right
-    y = up / np.linalg.norm(up)
+    y = unit(up)
     x = np.cross(y, right)
     ahead, above, aside = HIP_FRACTIONS[sex]
     width = float(np.linalg.norm(across)) / (2 * aside)
@@ -138,8 +138,7 @@ def _with_trunk(
     up = middle - waist
     tall = float(np.linalg.norm(up))
     y = up / tall
-    x = np.cross(y, right)
-    x /= np.linalg.norm(x)
+    x = unit(np.cross(y, right))
     half = 0.5 * _BREADTH * tall * np.cross(x, y)
     placed = {"acromion_r": middle + half, "acromion_l": middle - half}
     for name, (ahead, above) in (("c7", _C7), ("suprasternale", _SUPRASTERNALE)):

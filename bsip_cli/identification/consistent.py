@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from bsip_cli.body.inertia import second_moments
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification.problem import INSTRUMENT_GROUPS, Estimate, Problem
 
@@ -25,21 +25,8 @@ from bsip_cli.identification.problem import INSTRUMENT_GROUPS, Estimate, Problem
 # about the joint: a body can have these parameters exactly if J > 0 (Wensing, Kim and Slotine
 # 2018). Parameters (10 n,) of n segments are in Pinocchio's order.
 
-
-def _basis() -> np.ndarray:
-    """(10, 4, 4) derivative of J with respect to the ten parameters."""
-    basis = np.zeros((10, 4, 4))
-    basis[0, 3, 3] = 1.0
-    for k in range(3):
-        basis[1 + k, k, 3] = basis[1 + k, 3, k] = 1.0
-    for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))):
-        tensor = np.zeros((3, 3))
-        tensor[i, j] = tensor[j, i] = 1.0
-        basis[4 + k, :3, :3] = second_moments(tensor)
-    return basis
-
-
-BASIS = _basis()
+BASIS = np.array([pin.PseudoInertia.FromDynamicParameters(one).toMatrix() for one in np.eye(10)])
+"""(10, 4, 4) derivative of J with respect to the ten parameters."""
 
 
 def pseudo_inertias(phi: np.ndarray) -> np.ndarray:

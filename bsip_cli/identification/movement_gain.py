@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +10,7 @@ import pinocchio as pin
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.ground_wrench import wrench_regressor
-from bsip_cli.files.regular import shipped
+from bsip_cli.files.regular import read_toml, shipped
 from bsip_cli.identification.problem import Problem
 from bsip_cli.identification.uncertainty import Beforehand, beforehand
 
@@ -64,8 +63,8 @@ class Movement:
 
 def load_movements() -> tuple[Movement, ...]:
     """The movements of ``configs/movements.toml``, those of one side once for each side."""
-    text, movements = shipped("movements.toml").read_text(encoding="utf-8"), []
-    for row in tomllib.loads(text)["movements"]:
+    movements = []
+    for row in read_toml(shipped("movements.toml"))["movements"]:
         for side in _SIDES if "side" in row else ("",):
             other = {"l": "r", "r": "l"}.get(side, "")
             words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from bsip_cli.body.inertia import Inertia, readable_jacobian, rod_length_m
+from bsip_cli.body.inertia import Inertia, readable_jacobians, rod_length_m
 from bsip_cli.body.person import Person
 from bsip_cli.segments import mirrored
 
@@ -98,7 +98,7 @@ def prior_of(
     phi = np.concatenate([i.moved(-o).phi() for i, o in zip(inertias, origins, strict=True)])
     pairs = _pairs(names, fixed)
     own, alike = _own_spread(inertias, spread, names)
-    readable = block_diag(*(readable_jacobian(part) for part in phi.reshape(-1, 10)))
+    readable = readable_jacobians(phi)
     # root of the correlation of all: a twin's is the mirrored one's, in what both sides share
     together, rows = np.eye(len(phi)), np.arange(10)
     for first, second in (10 * np.array(pair)[:, None] + rows for pair in pairs if len(pair) == 2):
@@ -166,24 +166,24 @@ def _own_spread(
     """(10 n, 10 n) readable parameters of independent changes: a heavier segment has the heavier
     tensor too. And the part (10 n,) of each standard deviation that both sides of a body share:
     people's, not that of the two origins."""
-    blocks, alike = [], []
-    mass = np.broadcast_to(spread.mass_sd_percent, len(names)) / 100
-    com = np.broadcast_to(spread.com_sd_percent, (len(names), 3)) / 100
-    moments = np.broadcast_to(spread.inertia_sd_percent, len(names)) / 100
-    for i, (inertia, name) in enumerate(zip(inertias, names, strict=True)):
-        own = np.diag(inertia.tensor_kgm2)
-        products = np.sqrt([own[0] * own[1], own[0] * own[2], own[1] * own[2]])
-        centre, part = com[i] * rod_length_m(inertia), moments[i]
-        sd = np.r_[mass[i] * inertia.mass_kg, centre, part * own, 0.5 * part * products]
+    mass, moments = (
+        np.broadcast_to(percent, len(names))[:, None] / 100
+        for percent in (spread.mass_sd_percent, spread.inertia_sd_percent)
+    )
+    table = np.array([inertia.readable() for inertia in inertias])
+    rods = np.array([rod_length_m(inertia) for inertia in inertias])
+    own = table[:, 4:7]
+    products = np.sqrt(own[:, [0, 0, 1]] * own[:, [1, 2, 2]])
+    centres = np.broadcast_to(spread.com_sd_percent, (len(names), 3)) / 100 * rods[:, None]
+    sd = np.hstack([mass * table[:, :1], centres, moments * own, 0.5 * moments * products])
+    for i, name in enumerate(names):
         if mirrored(name) == name:
-            sd[_SIDEWAYS] = min(sd[_SIDEWAYS], spread.midline_sd_m)
+            sd[i, _SIDEWAYS] = min(sd[i, _SIDEWAYS], spread.midline_sd_m)
         if name in _EDITIONS_APART_M:
-            sd[_FORWARDS] = np.hypot(sd[_FORWARDS], _EDITIONS_APART_M[name])
-            sd[_TILT] = np.hypot(sd[_TILT], inertia.readable()[_TILT])
-        people = sd.copy()
-        sd[_CENTRE] = np.hypot(sd[_CENTRE], spread.origin_sd_m)
-        alike.append(people / sd)
-        block = np.diag(sd)
-        block[4:, 0] = mass[i] * inertia.readable()[4:]
-        blocks.append(block)
-    return block_diag(*blocks), np.concatenate(alike)
+            sd[i, _FORWARDS] = np.hypot(sd[i, _FORWARDS], _EDITIONS_APART_M[name])
+            sd[i, _TILT] = np.hypot(sd[i, _TILT], table[i, _TILT])
+    people = sd.copy()
+    sd[:, _CENTRE] = np.hypot(sd[:, _CENTRE], spread.origin_sd_m)
+    blocks = sd[:, :, None] * np.eye(10)
+    blocks[:, 4:, 0] = mass * table[:, 4:]
+    return block_diag(*blocks), (people / sd).ravel()

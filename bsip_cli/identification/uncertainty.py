@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.stats import chi2
 
-from bsip_cli.body.inertia import from_phi, readable_jacobian
+from bsip_cli.body.inertia import from_phi, readable_jacobians
 from bsip_cli.identification.prior import Prior
 from bsip_cli.identification.problem import Estimate, Problem
 
@@ -101,8 +101,7 @@ class Beforehand:
 def beforehand(problem: Problem) -> Beforehand:
     """The table's spread of a problem, linearised about the table."""
     prior = problem.prior
-    blocks = zip(*(x.reshape(-1, 10, *x.shape[1:]) for x in (prior.phi, prior.root)), strict=True)
-    rows = np.concatenate([readable_jacobian(phi) @ root for phi, root in blocks])
+    rows = readable_jacobians(prior.phi) @ prior.root
     return Beforehand(prior.root, rows / prior.readable_sd.reshape(-1, 1))
 
 
@@ -137,22 +136,15 @@ def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
     The forces show where a centre of mass lies from the model's origin; how far that lies from the
     anatomical one is left, whatever they show.
     """
-    n = len(prior.inertias)
-    values, sd, share = (np.empty((n, 10)) for _ in range(3))
-    for i in range(n):
-        block = slice(10 * i, 10 * i + 10)
-        phi = estimate.phi[block]
-        covariance = estimate.covariance[block, block]
-        values[i] = from_phi(phi).moved(prior.origin_in_joint_m[i]).readable()
-        sd[i] = _sd(readable_jacobian(phi), covariance)
-        at_table = readable_jacobian(prior.phi[block])
-        before = prior.readable_sd[i]
-        if estimate.prior_covariance is not None:
-            before = _sd(at_table, estimate.prior_covariance[block, block])
-        left = _sd(at_table, covariance) / before
-        share[i] = np.clip(1.0 - left**2, 0.0, 1.0)
-        sd[i, 1:4] = np.hypot(sd[i, 1:4], prior.origin_sd_m)
-    return ReadableParameters(values, sd, share)
+    bodies = zip(estimate.phi.reshape(-1, 10), prior.origin_in_joint_m, strict=True)
+    values = np.array([from_phi(phi).moved(origin).readable() for phi, origin in bodies])
+    sd = _sd(readable_jacobians(estimate.phi), estimate.covariance)
+    sd[:, 1:4] = np.hypot(sd[:, 1:4], prior.origin_sd_m)
+    at_table, before = readable_jacobians(prior.phi), prior.readable_sd
+    if estimate.prior_covariance is not None:
+        before = _sd(at_table, estimate.prior_covariance)
+    left = _sd(at_table, estimate.covariance) / before
+    return ReadableParameters(values, sd, np.clip(1.0 - left**2, 0.0, 1.0))
 
 
 def root_of(covariance: np.ndarray) -> np.ndarray:
@@ -162,7 +154,9 @@ def root_of(covariance: np.ndarray) -> np.ndarray:
 
 
 def _sd(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))
+    """(n, 10)"""
+    variance = np.sum(jacobian @ covariance * jacobian, axis=1)
+    return np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 10)
 
 
 # --- how rare an identified body is among people: all segments, in the prior's spread -------------

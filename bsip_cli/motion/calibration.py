@@ -88,6 +88,18 @@ def _rough_stature(landmarks: Places) -> float:
     )
 
 
+_ENDS = {  # joints at both ends, by row of the table; of a clavicle, which has none
+    "": ("sternoclavicular", "shoulder"),
+    "torso": ("neck", "waist"),
+    "arm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+    "thigh": ("hip", "knee"),
+    "shank": ("knee", "ankle"),
+}
+# The joint whose axis is the segment's Z.
+_HINGE = {"upper_arm": "elbow", "forearm": "elbow", "thigh": "knee", "shank": "knee"}
+
+
 def _frames(skeleton: Skeleton, centres: JointCentres, landmarks: Places) -> dict[str, Frame]:
     """Origin and axes of every segment in the standing pose (ISB, as in Dumas 2007)."""
     p = centres.positions
@@ -113,20 +125,16 @@ def _frames(skeleton: Skeleton, centres: JointCentres, landmarks: Places) -> dic
     for s in "lr":
         # Rods without mass need no axes of their own: their angles count from this pose.
         frames[f"clavicle_{s}"] = (p[f"sternoclavicular_{s}"], torso)
-        elbow, knee = centres.hinges[f"elbow_{s}"], centres.hinges[f"knee_{s}"]
-        upper, fore = p[f"shoulder_{s}"] - p[f"elbow_{s}"], p[f"elbow_{s}"] - p[f"wrist_{s}"]
-        thigh, shank = p[f"hip_{s}"] - p[f"knee_{s}"], p[f"knee_{s}"] - p[f"ankle_{s}"]
-        frames[f"upper_arm_{s}"] = (p[f"shoulder_{s}"], _y_first(upper, elbow))
-        frames[f"forearm_{s}"] = (p[f"elbow_{s}"], _y_first(fore, elbow))
-        frames[f"thigh_{s}"] = (p[f"hip_{s}"], _y_first(thigh, knee))
-        frames[f"shank_{s}"] = (p[f"knee_{s}"], _y_first(shank, knee))
-        names = (f"styloid_radial_{s}", f"styloid_ulnar_{s}")
-        across = elbow  # or to the person's right between the styloids
-        if all(name in landmarks for name in names):
-            across = (1.0 if s == "r" else -1.0) * (landmarks[names[0]] - landmarks[names[1]])
-        end = centres.ends.get(f"hand_{s}")
-        along = fore if end is None else p[f"wrist_{s}"] - end
-        frames[f"hand_{s}"] = (p[f"wrist_{s}"], _y_first(along, across))
+        for name, hinge in _HINGE.items():
+            start, end = (p[f"{joint}_{s}"] for joint in _ENDS[name.removeprefix("upper_")])
+            frames[f"{name}_{s}"] = (start, _y_first(start - end, centres.hinges[f"{hinge}_{s}"]))
+        radial, ulnar = (landmarks.get(f"styloid_{name}_{s}") for name in ("radial", "ulnar"))
+        across = centres.hinges[f"elbow_{s}"]  # or to the person's right between the styloids
+        if radial is not None and ulnar is not None:
+            across = (1.0 if s == "r" else -1.0) * (radial - ulnar)
+        wrist, fingers = p[f"wrist_{s}"], centres.ends.get(f"hand_{s}")
+        along = p[f"elbow_{s}"] - wrist if fingers is None else wrist - fingers
+        frames[f"hand_{s}"] = (wrist, _y_first(along, across))
         sole = centres.ends[f"foot_{s}"] - landmarks[f"calcaneus_{s}"]
         x = unit(sole)
         y = unit(np.cross(centres.hinges[f"ankle_{s}"], x))
@@ -185,16 +193,6 @@ def _person(
     )
 
 
-_ENDS = {  # joints at both ends, by row of the table; of a clavicle, which has none
-    "": ("sternoclavicular", "shoulder"),
-    "torso": ("neck", "waist"),
-    "arm": ("shoulder", "elbow"),
-    "forearm": ("elbow", "wrist"),
-    "thigh": ("hip", "knee"),
-    "shank": ("knee", "ankle"),
-}
-
-
 def _joint_to_joint(centres: JointCentres, row: str, side: str) -> float:
     start, end = (centres.positions[f"{one}_{side}" if side else one] for one in _ENDS[row])
     return float(np.linalg.norm(end - start))
@@ -218,10 +216,9 @@ def _table_lengths(
             start, axes = frames["lower_torso"]
             x, y, _ = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - start)
             lengths[i] = np.hypot(x, y)
-        elif row == "foot":
-            lengths[i] = np.linalg.norm(centres.ends[name] - landmarks[f"calcaneus_{side}"])
-        elif row == "hand" and name in centres.ends:
-            lengths[i] = np.linalg.norm(centres.ends[name] - p[f"wrist_{side}"])
+        elif name in centres.ends:  # of a foot or a hand
+            start = landmarks[f"calcaneus_{side}"] if row == "foot" else p[f"wrist_{side}"]
+            lengths[i] = np.linalg.norm(centres.ends[name] - start)
         elif row == "head" and "vertex" in landmarks:
             lengths[i] = np.linalg.norm(landmarks["vertex"] - p["neck"])
         else:
@@ -273,17 +270,16 @@ class FunctionalJoint:
 
     def nearest_to(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """(3,) the point of the axis nearest to the line through a and b (3,)."""
-        along = (b - a) / np.linalg.norm(b - a)
-        across = np.cross(self.axis, along)
-        across /= np.linalg.norm(across)
-        # Seen along the other line: how far to go on the axis until both meet.
-        normal = np.cross(across, along)
-        return self.point + self.axis * ((a - self.point) @ normal) / (self.axis @ normal)
+        # It lies in the plane of that line and of the direction across both.
+        along = unit(b - a)
+        return self._at_plane(a, np.cross(unit(np.cross(self.axis, along)), along))
 
     def in_plane(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
         """(3,) where the axis meets the plane through a, b and c (3,)."""
-        normal = np.cross(b - a, c - a)
-        return self.point + self.axis * ((a - self.point) @ normal) / (self.axis @ normal)
+        return self._at_plane(a, np.cross(b - a, c - a))
+
+    def _at_plane(self, inside: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        return self.point + self.axis * ((inside - self.point) @ normal) / (self.axis @ normal)
 
 
 def functional_joint(
@@ -316,7 +312,7 @@ def functional_joint(
     cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
     return FunctionalJoint(
         points.mean(axis=0),
-        axis / np.linalg.norm(axis),
+        unit(axis),
         float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
         float(np.sqrt((left**2).sum(axis=1).mean())),
     )

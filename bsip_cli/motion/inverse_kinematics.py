@@ -240,12 +240,16 @@ def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np
 def coordinate_information(person: Person, columns: np.ndarray, prior_rad: float) -> np.ndarray:
     """(N, nv, nv) the inverse of that covariance, of markers that move by ``columns`` (N, m, 3, nv)
     for each unit velocity."""
-    weighted = columns * np.sqrt(person.marker_weights)[:, None, None]
-    flat = weighted.reshape(len(columns), -1, columns.shape[-1])
-    information = np.einsum("fki,fkj->fij", flat, flat, optimize=True)
+    information = normal_matrix(columns, person.marker_weights)
     turns = range(6, columns.shape[-1])
     information[:, turns, turns] += prior_rad**-2
     return information
+
+
+def normal_matrix(columns: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(N, nv, nv) of markers with weights (N, m) or (m,) that move by ``columns`` (N, m, 3, nv)."""
+    weighted = _flat(np.sqrt(weights)[..., None, None] * columns)
+    return weighted.swapaxes(1, 2) @ weighted
 
 
 # --- how the pose answers to small errors of the markers, and what it leaves of them --------------
@@ -272,8 +276,7 @@ class PoseResponse:
         nv = len(self.person.skeleton.v_names)
         inverse = np.empty((len(self.q), nv, nv))
         for part, at in self._blocks:
-            weighted = _flat(np.sqrt(self.weights[part])[..., None, None] * at.columns())
-            information = weighted.swapaxes(1, 2) @ weighted
+            information = normal_matrix(at.columns(), self.weights[part])
             information[:, range(nv), range(nv)] += _PRIOR_M**2
             inverse[part] = np.linalg.inv(information)
         return inverse

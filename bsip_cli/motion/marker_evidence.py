@@ -314,7 +314,7 @@ class Evidence:
         return any(one.put_right for one in self.events)
 
 
-def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray | None = None) -> Evidence:
+def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray) -> Evidence:
     """All events of one trial, and the markers without its swaps.
 
     refit : poses fitted to other markers (n, m, 3) at times (n,); called only where labels may be
@@ -324,8 +324,7 @@ def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray | None = No
     """
     labelling = relabelled(Labelling(fit, refit))
     fit = labelling.fit
-    recorded = np.zeros(fit.measured_m.shape[:2], dtype=bool) if filled is None else filled
-    guessed = exchanged(recorded, labelling.order)
+    guessed = exchanged(filled, labelling.order)
     jumped, astray = jumps(fit, fit.residual_m, guessed)
     residual = np.where((astray | guessed)[..., None], np.nan, fit.residual_m)
     slipped, level = slips(fit, residual)

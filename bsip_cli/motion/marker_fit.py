@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import marker_trust, posed
+from bsip_cli.motion.inverse_kinematics import marker_trust, normal_matrix, posed
 
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
@@ -63,21 +63,18 @@ class MarkerFit:
         frames = np.unique(np.linspace(0, len(self.q) - 1, _RESPONSE_FRAMES).astype(int))
         at, m = posed(self.person, self.q[frames]), len(self.labels)
         columns = np.einsum("fmji,fmjv->fmiv", at.turns(), at.columns())
-        columns = columns.reshape(len(frames), 3 * m, -1)
-        nv, weights = columns.shape[2], self.person.marker_weights / self.marker_sd_m**2
-        total, seen_total = np.zeros((3 * m, 3 * m)), np.zeros(m)
         trust = marker_trust(self.residual_m[frames], self.robust_limit_m)
-        for columns_f, share in zip(columns, trust, strict=True):
-            seen = share > 0
-            weighted = np.repeat(weights * share, 3)[:, None] * columns_f
-            information = columns_f.T @ weighted
-            information[range(6, nv), range(6, nv)] += _POSTURE_SD_RAD**-2
-            information[range(nv), range(nv)] += 1e-9 * np.trace(information) / nv
-            gain = np.linalg.solve(information, weighted.T)
-            total += columns_f @ gain * np.repeat(seen, 3)[None]
-            seen_total += seen
-        mean = total / np.repeat(np.maximum(seen_total, 1), 3)[None]
-        return (np.eye(3 * m) - mean).reshape(m, 3, m, 3)
+        weights = trust * self.person.marker_weights / self.marker_sd_m**2
+        information = normal_matrix(columns, weights)
+        every = np.arange(columns.shape[3])
+        information[:, every[6:], every[6:]] += _POSTURE_SD_RAD**-2
+        mean = np.trace(information, axis1=1, axis2=2)[:, None] / len(every)
+        information[:, every, every] += 1e-9 * mean
+        rows, weight = columns.reshape(len(frames), 3 * m, -1), np.repeat(weights, 3, axis=1)
+        gain = np.linalg.solve(information, (weight[..., None] * rows).swapaxes(1, 2))
+        seen = np.repeat(trust > 0, 3, axis=1)
+        follows = (rows @ gain * seen[:, None]).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+        return (np.eye(3 * m) - follows).reshape(m, 3, m, 3)
 
     def angles_about(self, segment: int) -> np.ndarray:
         """(N, k) angles [rad] about a segment, which its skin may follow: hinge angles, and twice

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt, welch
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.inverse_kinematics import coordinate_covariance, posed
+from bsip_cli.motion.inverse_kinematics import coordinate_covariance, marker_trust, posed
 from bsip_cli.motion.splines import SkinNoise, SmoothSignal, bridged, noise_level, smooth
 
 # --- how much the skin swings against the bones, from the residuals of the inverse kinematics -----
@@ -45,10 +45,8 @@ def skin_corner_hz(
     robust_limit_m : beyond it a marker's pull on the poses fades.
     """
     residuals = posed(person, q).residuals(markers)
-    distance = np.linalg.norm(residuals, axis=2, keepdims=True)
-    weight = np.minimum(1.0, robust_limit_m / np.maximum(distance, 1e-12)) ** 2
-    pull = residuals * weight / np.nanmean(weight)  # as the poses feel them
-    seen = np.isfinite(pull[..., 0])
+    trust, seen = marker_trust(residuals, robust_limit_m), np.isfinite(residuals[..., 0])
+    pull = residuals * trust[..., None] / trust[seen].mean()  # as the poses feel them
     pull = pull[:, seen.sum(axis=0) > _SEEN_SHARE * seen.any(axis=1).sum()]
     coordinates = 3 * pull.shape[1]
     free = coordinates - len(person.skeleton.v_names)

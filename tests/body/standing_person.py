@@ -100,16 +100,17 @@ def random_poses(person: Person, count: int, spread_rad: float, seed: int) -> np
     """(count, nq) poses about the standing one, base moved by about a metre."""
     model, rng = pinocchio_model(person), np.random.default_rng(seed)
     first = standing().q if len(person.skeleton.segments) == 15 else with_girdle().q
-    return np.stack(
-        [
-            pin.integrate(
-                model,
-                first,
-                np.concatenate([rng.normal(0, 0.7, 3), rng.normal(0, spread_rad, model.nv - 3)]),
-            )
-            for _ in range(count)
-        ]
-    )
+    spread = np.repeat([0.7, spread_rad], [3, model.nv - 3])
+    steps = rng.normal(0, spread, (count, model.nv))
+    return np.stack([pin.integrate(model, first, step) for step in steps])
+
+
+def random_states(model: pin.Model, count: int, seed: int) -> tuple[np.ndarray, ...]:
+    """q (count, nq) about the neutral pose, and v and a (count, nv)."""
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(0, 1, (count, model.nv))
+    q = np.stack([pin.integrate(model, pin.neutral(model), step) for step in steps])
+    return q, rng.normal(0, 2, steps.shape), rng.normal(0, 10, steps.shape)
 
 
 def joint_frames(person: Person, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

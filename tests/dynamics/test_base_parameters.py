@@ -7,7 +7,7 @@ import pytest
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
 from bsip_cli.dynamics.ground_wrench import pinocchio_model, wrench_regressor
 from bsip_cli.segments import SEGMENTS
-from tests.body.standing_person import standing, tilted_person
+from tests.body.standing_person import random_states, standing, tilted_person
 
 
 @pytest.fixture(scope="module", params=["standing", "tilted"])
@@ -25,18 +25,8 @@ def rank_by_gap(matrix):
 
 
 def test_all_forty_rows_have_the_same_rank_as_six(model):
-    rng = np.random.default_rng(1)
-    data = model.createData()
-    rows = [
-        pin.computeJointTorqueRegressor(
-            model,
-            data,
-            pin.integrate(model, pin.neutral(model), rng.uniform(-1.5, 1.5, 40)),
-            rng.normal(0, 3, 40),
-            rng.normal(0, 20, 40),
-        ).copy()
-        for _ in range(40)
-    ]
+    data, states = model.createData(), zip(*random_states(model, 40, seed=1), strict=True)
+    rows = [pin.computeJointTorqueRegressor(model, data, *state).copy() for state in states]
     for count in (40, 6):
         rank, gap = rank_by_gap(np.concatenate([row[:count] for row in rows]))
         assert rank == 128
@@ -47,12 +37,8 @@ def test_the_basis_reproduces_the_regressor_at_states_it_never_saw(model):
     basis = find_basis(model)
     assert basis.rank == 128
     assert len(set(basis.independent.tolist())) == 128
-    rng = np.random.default_rng(2)
-    q = np.stack(
-        [pin.integrate(model, pin.neutral(model), rng.normal(0, 1, 40)) for _ in range(10)]
-    )
-    v, a = rng.normal(0, 2, (10, 40)), rng.normal(0, 10, (10, 40))
-    Y = wrench_regressor(model, q, v, a, np.array([0.5, 1.0, 0.0]))
+    states = random_states(model, 10, seed=2)
+    Y = wrench_regressor(model, *states, np.array([0.5, 1.0, 0.0]))
     again = Y[..., basis.independent] @ basis.combine
     np.testing.assert_allclose(again, Y, rtol=0, atol=1e-8 * np.abs(Y).max())
     scale = np.linalg.norm(Y.reshape(-1, 150), axis=0)  # and column by column

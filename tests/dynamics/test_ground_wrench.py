@@ -15,7 +15,14 @@ from bsip_cli.dynamics.ground_wrench import (
     skew,
     wrench_regressor,
 )
-from tests.body.standing_person import joint_frames, parameters_of, standing, tilted_person
+from tests.body.standing_person import (
+    joint_frames,
+    parameters_of,
+    random_states,
+    standing,
+    tilted_person,
+)
+from tests.body.test_inertia import random_body
 from tests.dynamics.newton_euler import driving_wrench
 from tests.dynamics.test_joint_moments import STEP_S, G, motion, newton_euler, phi_of
 
@@ -23,18 +30,10 @@ ORIGIN = np.zeros(3)
 INNER = slice(8, -8)  # differences at the ends are wrong
 
 
-def random_inertias(count, seed):
-    """(count, 10) parameters of clouds of points."""
+def random_phi(seed):
+    """(150,) parameters of fifteen clouds of points."""
     rng = np.random.default_rng(seed)
-    rows = []
-    for _ in range(count):
-        points = rng.normal(0, 0.2, (20, 3)) + rng.normal(0, 0.2, 3)
-        mass = rng.uniform(0.3, 15)
-        moments = mass * points.T @ points / 20
-        tensor = np.trace(moments) * np.eye(3) - moments
-        order = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]
-        rows.append([mass, *(mass * points.mean(axis=0)), *(tensor[ij] for ij in order)])
-    return np.array(rows)
+    return np.concatenate([random_body(rng)[0].phi() for _ in range(15)])
 
 
 def with_inertias(model, phi):
@@ -43,14 +42,6 @@ def with_inertias(model, phi):
     for i, row in enumerate(phi.reshape(-1, 10)):
         full.inertias[i + 1] = pin.Inertia.FromDynamicParameters(row)
     return full
-
-
-def states(model, count, seed):
-    rng = np.random.default_rng(seed)
-    q = np.stack(
-        [pin.integrate(model, pin.neutral(model), rng.normal(0, 1, model.nv)) for _ in range(count)]
-    )
-    return q, rng.normal(0, 2, (count, model.nv)), rng.normal(0, 10, (count, model.nv))
 
 
 def rnea_wrench(model, phi, q, v, a, reference):
@@ -69,8 +60,8 @@ def rnea_wrench(model, phi, q, v, a, reference):
 @pytest.mark.parametrize("reference", [(0.0, 0.0, 0.0), (1.3, -0.4, 0.2)])
 def test_regressor_equals_inverse_dynamics(reference):
     model = pinocchio_model(tilted_person())
-    phi = random_inertias(15, seed=1).ravel()
-    q, v, a = states(model, 20, seed=2)
+    phi = random_phi(1)
+    q, v, a = random_states(model, 20, seed=2)
     rows = wrench_regressor(model, q, v, a, np.array(reference))
     expected = rnea_wrench(model, phi, q, v, a, np.array(reference))
     np.testing.assert_allclose(rows @ phi, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
@@ -117,8 +108,8 @@ def test_a_person_at_rest_presses_down_below_the_centre_of_mass():
 
 def test_blocks_change_nothing():
     model = pinocchio_model(standing().person)
-    q, v, a = states(model, 13, seed=4)
-    phi = np.stack([random_inertias(15, seed=s).ravel() for s in (5, 6)], axis=1)
+    q, v, a = random_states(model, 13, seed=4)
+    phi = np.stack([random_phi(seed) for seed in (5, 6)], axis=1)
     whole = predicted_wrench(model, q, v, a, phi, np.ones(3), block=100)
     parts = predicted_wrench(model, q, v, a, phi, np.ones(3), block=5)
     np.testing.assert_array_equal(whole, parts)
@@ -127,8 +118,8 @@ def test_blocks_change_nothing():
 
 def test_moved_moments_are_those_of_the_regressor():
     model = pinocchio_model(standing().person)
-    q, v, a = states(model, 6, seed=8)
-    phi = random_inertias(15, seed=9).reshape(-1, 1)
+    q, v, a = random_states(model, 6, seed=8)
+    phi = random_phi(9)[:, None]
     reference = np.array([0.4, -1.2, 0.3])
     about_origin = predicted_wrench(model, q, v, a, phi, np.zeros(3))[..., 0]
     about_point = predicted_wrench(model, q, v, a, phi, reference)[..., 0]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bsip_cli.body.exports import model_text
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim import osim_text
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.dynamics.joint_moments import joint_loads
 from tests.body.standing_person import Swing, joint_frames, standing
@@ -41,7 +41,7 @@ def test_moments_of_inverse_dynamics_tool(tmp_path):
 
 def written(folder: Path, body, times, q, told_s, wrenches) -> Path:
     """Model, motion, loads and the set-up of the tool."""
-    (folder / "model.osim").write_text(osim_text(body))
+    (folder / "model.osim").write_text(model_text("osim", body))
     motion = coordinates(body.person.skeleton, q)
     (folder / "motion.mot").write_text(mot_text("motion", times, motion, ["from bsip"]))
     (folder / "loads.mot").write_text(mot_text("loads", told_s, loads(wrenches), ["from bsip"]))

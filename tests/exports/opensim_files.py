@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.osim import COORDINATES
+from bsip_cli.body.exports.opensim_motion import COORDINATES
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.joint_moments import JointLoads
 from tests.dynamics.newton_euler import driving_wrench, joint_axes

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.exports.biomod import biomod_text
+from bsip_cli.body.exports import model_text
 from tests.exports.exported_person import moving_body
 
 biorbd = pytest.importorskip("biorbd", reason="the biorbd package is not installed")
@@ -15,7 +15,7 @@ biorbd = pytest.importorskip("biorbd", reason="the biorbd package is not install
 @pytest.fixture(scope="module")
 def read(identified, tmp_path_factory):
     file = tmp_path_factory.mktemp("biomod") / "person.bioMod"
-    file.write_text(biomod_text(identified), encoding="utf-8")
+    file.write_text(model_text("biomod", identified), encoding="utf-8")
     return biorbd.Model(str(file))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.exports.mjcf import mjcf_text
+from bsip_cli.body.exports import model_text
 from tests.exports.exported_person import identified_person, joint_frames, our_model, poses
 
 mujoco = pytest.importorskip("mujoco", reason="the mujoco package is not installed")
@@ -19,7 +19,7 @@ def identified():
 
 @pytest.fixture(scope="module")
 def read(identified):
-    return mujoco.MjModel.from_xml_string(mjcf_text(identified))
+    return mujoco.MjModel.from_xml_string(model_text("mjcf", identified))
 
 
 def qpos_of(q: np.ndarray, skeleton) -> np.ndarray:
@@ -108,7 +108,7 @@ def test_markers_are_sites(read, identified):
 def test_clavicles_weigh_next_to_nothing():
     """MuJoCo refuses a body that moves and has no mass."""
     body = identified_person(girdle=True)
-    read = mujoco.MjModel.from_xml_string(mjcf_text(body))
+    read = mujoco.MjModel.from_xml_string(model_text("mjcf", body))
     assert (read.nv, read.nbody) == (46, 18)
     assert read.body_mass.sum() == pytest.approx(body.mass_kg, abs=1e-5)
     assert read.body("clavicle_l").mass[0] < 1e-5

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim import COORDINATES, osim_text
+from bsip_cli.body.exports import model_text
+from bsip_cli.body.exports.opensim_motion import (
+    COORDINATES,
+    coordinates,
+    loads,
+    loads_xml,
+    mot_text,
+    setup_xml,
+)
 from bsip_cli.dynamics.joint_moments import joint_loads
 from tests.body.standing_person import joint_frames, standing
 from tests.dynamics.test_joint_moments import KNOWN, STEP_S, feet, motion, phi_of
@@ -23,7 +30,7 @@ def written(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("opensim")
     body, q, v, a = motion(request.param)
     times, ground = STEP_S * np.arange(len(q)), feet(len(q))
-    (folder / "m.osim").write_text(osim_text(body))
+    (folder / "m.osim").write_text(model_text("osim", body))
     columns = coordinates(body.person.skeleton, q)
     (folder / "m.mot").write_text(mot_text("m", times, columns, ["said"]))
     acting = loads({name: one.wrench for name, one in ground.items()})

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.exports.osim import osim_text
+from bsip_cli.body.exports import model_text
 from tests.exports.exported_person import configuration, our_model, whole_body
 
 opensim = pytest.importorskip("opensim", reason="the opensim package is not installed")
@@ -16,7 +16,7 @@ opensim = pytest.importorskip("opensim", reason="the opensim package is not inst
 def read(identified, tmp_path_factory):
     opensim.Logger.setLevelString("error")
     file = tmp_path_factory.mktemp("osim") / "person.osim"
-    file.write_text(osim_text(identified), encoding="utf-8")
+    file.write_text(model_text("osim", identified), encoding="utf-8")
     model = opensim.Model(str(file))
     model.initSystem()
     return model

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.exports.urdf import urdf_text
+from bsip_cli.body.exports import model_text
 from tests.exports.exported_person import moving_body, whole_body
 
 
 @pytest.fixture(scope="module")
 def read(identified) -> pin.Model:
-    return pin.buildModelFromXML(urdf_text(identified), pin.JointModelFreeFlyer())
+    return pin.buildModelFromXML(model_text("urdf", identified), pin.JointModelFreeFlyer())
 
 
 def placements(model: pin.Model, q: np.ndarray, names) -> dict[str, pin.SE3]:

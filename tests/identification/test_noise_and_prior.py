@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian
+from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian, readable_jacobians
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.identification.problem import Estimate, noise_of
 from bsip_cli.identification.uncertainty import readable
@@ -125,16 +125,8 @@ def test_left_and_right_go_together_and_the_midline_is_not_lopsided():
     spread = replace(SPREAD, left_right_correlation=0.93, midline_sd_m=0.005)
     person, bodies = world().person, world().prior.inertias
     prior = prior_of(bodies, person, spread)
-    read = np.array(
-        [
-            np.concatenate([readable_jacobian(part) @ change for part, change in pairs])
-            for pairs in (
-                list(zip(prior.phi.reshape(-1, 10), column.reshape(-1, 10), strict=True))
-                for column in prior.root.T
-            )
-        ]
-    )
-    covariance = read.T @ read
+    read = readable_jacobians(prior.phi) @ prior.root
+    covariance = read @ read.T
     correlation = covariance / np.sqrt(np.outer(*[np.diag(covariance)] * 2))
     left, right = (10 * person.skeleton.index(f"shank_{side}") for side in "lr")
     together = correlation[range(left, left + 10), range(right, right + 10)]

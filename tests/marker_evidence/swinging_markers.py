@@ -8,7 +8,7 @@ import numpy as np
 
 from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import solve_trial
-from bsip_cli.motion.marker_evidence import marker_evidence
+from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from tests.body.standing_person import Swing, joint_frames, markers_of, standing
 
@@ -69,5 +69,11 @@ def markers_on(*segments: str) -> list[str]:
     return [label for label, k in on if PERSON.skeleton.segments[k] in segments]
 
 
+def judged(times: np.ndarray, markers: np.ndarray, filled: np.ndarray | None = None) -> Evidence:
+    """Of frames that are recorded, but for those that were filled."""
+    recorded = np.zeros(markers.shape[:2], dtype=bool) if filled is None else filled
+    return marker_evidence(fitted(markers, times), fitted, recorded)
+
+
 def events_of(times: np.ndarray, markers: np.ndarray, filled: np.ndarray | None = None):
-    return marker_evidence(fitted(markers, times), fitted, filled).events
+    return judged(times, markers, filled).events

@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
-from bsip_cli.motion.marker_exchange import (
-    Exchange,
-    Labelling,
-)
+from bsip_cli.motion.marker_events import summaries
+from bsip_cli.motion.marker_exchange import Exchange, Labelling
 from tests.marker_evidence.swinging_markers import (
     MARKERS,
     PERSON,
     exchange,
     fitted,
+    judged,
     markers_on,
     recording,
 )
@@ -28,10 +26,6 @@ OF_MANY = [
 ]
 
 
-def judged(markers: np.ndarray, times: np.ndarray, filled: np.ndarray | None = None) -> Evidence:
-    return marker_evidence(fitted(markers, times), fitted, filled)
-
-
 def misfit_of(markers: np.ndarray, times: np.ndarray) -> float:
     return fitted(markers, times).misfit_m()
 
@@ -39,15 +33,22 @@ def misfit_of(markers: np.ndarray, times: np.ndarray) -> float:
 @pytest.mark.parametrize(
     ("a", "b"), [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB"), ("RTEM", "LTEM")]
 )
-@pytest.mark.parametrize("frames", [slice(160, 205), slice(0, 250), slice(160, None)])
-def test_a_swap_is_undone(a, b, frames):
+@pytest.mark.parametrize(
+    "frames", [slice(160, 175), slice(160, 205), slice(0, 250), slice(160, None)]
+)
+def test_a_swap_is_found_and_undone(a, b, frames):
     times, clean, _ = recording(4)
-    markers = clean.copy()
+    markers, pair = clean.copy(), [MARKERS.index(a), MARKERS.index(b)]
     exchange(markers, a, b, frames)
-    found = judged(markers, times)
+    found = judged(times, markers)
     (event,) = found.events
-    assert event.put_right
-    assert found.any_corrected()
+    assert event.kind == "swap" and {event.marker, event.partner} == {a, b}
+    first, last = times[frames][0], times[frames][-1]
+    assert (event.start_s, event.end_s) == pytest.approx((first, last), abs=0.021)
+    apart = np.linalg.norm(clean[frames, pair[0]] - clean[frames, pair[1]], axis=1)
+    assert event.size_m == pytest.approx(np.median(apart), rel=0.1)
+    assert event.statistic > 2
+    assert event.put_right and found.any_corrected()
     assert event.sentence.endswith("; corrected")
     assert np.array_equal(found.markers_m, clean)
 
@@ -63,7 +64,7 @@ def test_a_segment_whose_markers_are_in_another_order_is_put_right(segment, seed
     other = np.random.default_rng(seed).permutation(mine)
     markers = clean.copy()
     markers[:, mine] = clean[:, other]
-    found = judged(markers, times)
+    found = judged(times, markers)
     assert np.array_equal(found.markers_m, clean)
     assert all(event.put_right for event in found.events if event.kind == "swap")
 
@@ -75,7 +76,7 @@ def test_across_a_joint_at_a_low_rate():
     exchange(markers, "LMALL", "LCAL", slice(160, 205))
     for edge, other in ((159, 160), (205, 204)):
         markers[edge] = 0.6 * markers[edge] + 0.4 * markers[other]
-    found = judged(markers, times)
+    found = judged(times, markers)
     (event,) = (one for one in found.events if one.kind == "swap")
     assert event.put_right
     inside = slice(160, 205)
@@ -98,7 +99,7 @@ def test_swaps_of_any_pair_are_undone_and_none_to_the_worse():
         start = int(rng.integers(20, 300))
         markers = clean.copy()
         exchange(markers, *pairs[k], slice(start, start + int(rng.integers(5, 90))))
-        found = judged(markers, times)
+        found = judged(times, markers)
         assert misfit_of(found.markers_m, times) <= misfit_of(markers, times)
         restored += np.array_equal(found.markers_m, clean)
     assert restored >= 11
@@ -110,7 +111,7 @@ def test_swaps_at_two_times_are_both_undone():
     exchange(markers, "RKNEL", "RKNEM", slice(60, 100))
     exchange(markers, "RKNEL", "RKNEM", slice(250, 300))
     exchange(markers, "LMALL", "LMALM", slice(80, 140))
-    found = judged(markers, times)
+    found = judged(times, markers)
     assert [(one.kind, one.put_right) for one in found.events] == [("swap", True)] * 3
     assert np.array_equal(found.markers_m, clean)
 
@@ -118,22 +119,27 @@ def test_swaps_at_two_times_are_both_undone():
 @pytest.mark.parametrize("seed", range(3))
 def test_right_labels_stay(seed):
     times, clean, _ = recording(seed)
-    found = judged(clean, times)
+    found = judged(times, clean)
     assert not found.any_corrected()
     assert found.markers_m is clean
 
 
-def test_of_an_exchanged_arm_the_marker_that_kept_its_label_keeps_it():
+@pytest.mark.parametrize("kept", ["", "RUA"])
+def test_of_an_exchanged_arm_the_marker_that_kept_its_label_keeps_it(kept):
     times, clean, _ = recording(5)
-    right = markers_on("upper_arm_r", "forearm_r", "hand_r")
+    right = set(markers_on("upper_arm_r", "forearm_r", "hand_r"))
+    assert len(right) == 6
     markers = clean.copy()
-    for label in right:
-        if label != "RUA":
-            exchange(markers, label, f"L{label[1:]}", slice(None))
-    found = judged(markers, times)
-    done = {one.marker for one in found.events if one.put_right}
-    assert done == set(right) - {"RUA"}
+    for label in right - {kept}:
+        exchange(markers, label, f"L{label[1:]}", slice(None))
+    found = judged(times, markers)
+    done = [one for one in found.events if one.put_right]
+    pairs = {(label, f"L{label[1:]}") for label in right - {kept}}
+    assert {(one.marker, one.partner) for one in done} == pairs
     assert np.array_equal(found.markers_m, clean)
+    (said,) = summaries(done, 5)
+    assert "bear each other's labels throughout the trial" in said
+    assert kept or len(done) == len(found.events)
 
 
 def test_filled_frames_go_with_their_marker():
@@ -144,7 +150,7 @@ def test_filled_frames_go_with_their_marker():
     markers[190:194, m] += 0.06 * turns[190:194, m] @ [1.0, 0.0, 0.0]
     exchange(markers, "RKNEL", "RKNEM", slice(160, 250))
     filled[190:194, other] = True
-    jumps = [one for one in judged(markers, times, filled).events if one.kind == "jump"]
+    jumps = [one for one in judged(times, markers, filled).events if one.kind == "jump"]
     assert [one.marker for one in jumps] == ["RKNEL"]
     assert "where a gap was filled" in jumps[0].sentence
 

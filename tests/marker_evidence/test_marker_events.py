@@ -12,9 +12,7 @@ from bsip_cli.motion.marker_events import MarkerEvent, offsets, summaries
 from tests.marker_evidence.swinging_markers import (
     MARKERS,
     events_of,
-    exchange,
     fitted,
-    markers_on,
     recording,
 )
 
@@ -119,41 +117,6 @@ def test_an_offset_that_begins_in_the_trial_is_a_slip():
     event = only(tuple(offsets(fit, fit.residual_m)))
     assert (event.kind, event.marker) == ("slip", "LMALL")
     assert event.start_s == pytest.approx(3.2, abs=0.06)
-
-
-PAIRS = [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB")]
-
-
-@pytest.mark.parametrize(("a", "b"), PAIRS)
-@pytest.mark.parametrize("frames", [slice(START, STOP), slice(0, 250), slice(START, None)])
-def test_exchanged_labels(a, b, frames):
-    times, clean, _ = recording(4)
-    markers, pair = clean.copy(), [MARKERS.index(a), MARKERS.index(b)]
-    exchange(markers, a, b, frames)
-    event = only(events_of(times, markers))
-    assert event.kind == "swap"
-    assert {event.marker, event.partner} == {a, b}
-    first, last = times[frames][0], times[frames][-1]
-    assert (event.start_s, event.end_s) == pytest.approx((first, last), abs=0.021)
-    apart = np.linalg.norm(clean[frames, pair[0]] - clean[frames, pair[1]], axis=1)
-    assert event.size_m == pytest.approx(np.median(apart), rel=0.1)
-    assert event.statistic > 2
-
-
-def test_both_arms_exchanged_throughout():
-    times, clean, _ = recording(5)
-    right = markers_on("upper_arm_r", "forearm_r", "hand_r")
-    assert len(right) == 6
-    markers = clean.copy()
-    for label in right:
-        exchange(markers, label, f"L{label[1:]}", slice(None))
-    events = events_of(times, markers)
-    assert {(one.kind, one.marker, one.partner) for one in events} == {
-        ("swap", label, f"L{label[1:]}") for label in right
-    }
-    said = summaries(events, 5)
-    assert len(said) == 1
-    assert "bear each other's labels throughout the trial" in said[0]
 
 
 def test_two_events_of_one_trial_are_both_found():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -16,10 +17,8 @@ from bsip_cli.body.person import Person
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import read_toml, shipped
 
-# Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
-# (ISB); the two other axes coincide only with the middle angle at 90 degrees.
-BALL_AXES = "zxy"
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 @cache
@@ -156,22 +155,38 @@ def neutral_pose(person: Person) -> tuple[np.ndarray, np.ndarray]:
     return np.array(rotations), np.array(joints)
 
 
-def numbers(values: Iterable[float]) -> str:
+# --- files from templates -------------------------------------------------------------------------
+
+
+def rendered(template: str, **known: Any) -> str:
+    """A file by its template in this folder's ``templates``."""
+    return _templates().get_template(template).render(known)
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy
+
+    made = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    made.filters |= {"numbers": numbers, "comment": xml_comment, "quaternion": _about_x}
+    made.filters["xml"] = lambda text: escape(text, {'"': "&quot;"})
+    return made
+
+
+def _about_x(turn_rad: float) -> tuple[float, ...]:
+    """Quaternion w, x, y, z."""
+    return np.cos(0.5 * turn_rad), np.sin(0.5 * turn_rad), 0.0, 0.0
+
+
+def numbers(values: float | Iterable[float]) -> str:
     """Numbers separated by blanks, with all their digits."""
     return " ".join(f"{value:.17g}" for value in np.asarray(values, dtype=float).ravel())
-
-
-def xml_document(tag: str, said: Iterable[str], **attributes: str) -> ET.Element:
-    """The root of a document that begins with a comment."""
-    root = ET.Element(tag, attributes)
-    root.append(ET.Comment(xml_comment(said)))
-    return root
-
-
-def xml_text(root: ET.Element, declared: bool = True) -> str:
-    """A document as text, indented."""
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode", xml_declaration=declared) + "\n"
 
 
 def xml_comment(lines: Iterable[str]) -> str:

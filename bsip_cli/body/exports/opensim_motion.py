@@ -3,15 +3,21 @@ of InverseDynamicsTool for both (.mot and .xml of OpenSim 4)."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.identified import xml_document, xml_text
-from bsip_cli.body.exports.osim import COORDINATES, add_texts
+from bsip_cli.body.exports.identified import rendered
 from bsip_cli.body.skeleton import Skeleton
+
+COORDINATES = {
+    "free": ("rz", "rx", "ry", "tx", "ty", "tz"),
+    "spherical": ("rz", "rx", "ry"),
+    "revolute": ("angle",),
+}
+"""Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
+(flexion), X after that turn, and Y of the segment."""
 
 LOADED_N = 20.0
 """A point of application is a quotient by the vertical force: below this the last one stays."""
@@ -20,7 +26,7 @@ _FORCE, _POINT, _TORQUE = "{}_force_v", "{}_force_p", "{}_torque_"
 
 
 def coordinates(skeleton: Skeleton, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Name and trajectory (N,) [rad, m] of every coordinate of `osim_text`, from q (N, nq).
+    """Name and trajectory (N,) [rad, m] of every coordinate of the exported model, from q (N, nq).
 
     Angles run on without jumps of a turn, and through the pose where the middle one is 90 degrees.
     """
@@ -83,17 +89,9 @@ def mot_text(
 
 def loads_xml(segments: Sequence[str], data_file: str, said: Sequence[str]) -> str:
     """``ExternalLoads`` on the segments from the columns of `loads`."""
-    document = xml_document("OpenSimDocument", said, Version="40000")
-    top = ET.SubElement(document, "ExternalLoads", name="externalloads")
-    objects = ET.SubElement(top, "objects")
-    for segment in segments:
-        parts = {"force": _FORCE, "point": _POINT, "torque": _TORQUE}
-        where = {f"{part}_expressed_in_body": "ground" for part in ("force", "point")}
-        columns = {f"{part}_identifier": name.format(segment) for part, name in parts.items()}
-        one = ET.SubElement(objects, "ExternalForce", name=segment)
-        add_texts(one, {"applied_to_body": segment} | where | columns)
-    ET.SubElement(top, "datafile").text = data_file
-    return xml_text(document)
+    columns = {"force": _FORCE, "point": _POINT, "torque": _TORQUE}
+    known = {"segments": segments, "data_file": data_file, "said": said}
+    return rendered("loads.xml.j2", **known, **columns)
 
 
 def setup_xml(
@@ -101,9 +99,5 @@ def setup_xml(
 ) -> str:
     """Set-up of InverseDynamicsTool; files : ``model_file``, ``coordinates_file`` and
     ``external_loads_file``, next to it. The motion is smooth: no further filter."""
-    document = xml_document("OpenSimDocument", said, Version="40000")
-    tool = ET.SubElement(document, "InverseDynamicsTool", name=name)
-    texts = {"results_directory": ".", **files, "time_range": f"{from_s:.12g} {to_s:.12g}"}
-    texts |= {"forces_to_exclude": "Muscles", "lowpass_cutoff_frequency_for_coordinates": "-1"}
-    add_texts(tool, texts | {"output_gen_force_file": f"{name}.sto"})
-    return xml_text(document)
+    known = {"name": name, "files": files, "from_s": from_s, "to_s": to_s, "said": said}
+    return rendered("setup.xml.j2", **known)

@@ -1,5 +1,4 @@
-"""OpenSim 4 (.osim): a model with the tree of our own skeleton, and the person's masses, centres of
-mass and inertias in a model that somebody gives.
+"""OpenSim 4 (.osim): the person's masses, centres of mass and inertias in a given model.
 
 The axes of a given model's bodies at zero coordinates are taken for those of the segments in the
 neutral pose (X anterior, Y up, Z to the right), as published models have them; origins are placed
@@ -9,7 +8,7 @@ on each other by joint centres that both have.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from copy import deepcopy
 from dataclasses import dataclass
 
@@ -18,110 +17,15 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.exports.identified import (
-    AXES,
-    BodyOnJoint,
     IdentifiedPerson,
     neutral_pose,
     numbers,
     xml_comment,
-    xml_document,
-    xml_text,
 )
-from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.skeleton import Skeleton, named_file
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml, shipped
-
-# A ball or free joint's speeds are no rates of its coordinates, and InverseDynamicsTool (OpenSim
-# 4.6) takes them for that: three turns in a row are a joint whose moments it computes.
-_JOINTS = {"free": "CustomJoint", "spherical": "CustomJoint", "revolute": "PinJoint"}
-COORDINATES = {
-    "free": ("rz", "rx", "ry", "tx", "ty", "tz"),
-    "spherical": ("rz", "rx", "ry"),
-    "revolute": ("angle",),
-}
-"""Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
-(flexion), X after that turn, and Y of the segment."""
-_KINDS = ("Body", "Joint", "Marker")
-
-
-def osim_text(body: IdentifiedPerson) -> str:
-    """An OpenSim 4 model: bodies, custom and pin joints, markers. Errors as of `check_bodies` and
-    `markers`."""
-    body.check_bodies()
-    document = xml_document("OpenSimDocument", body.said("osim"), Version="40000")
-    model = ET.SubElement(document, "Model", name=body.name)
-    ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
-    sets = (ET.SubElement(model, f"{kind}Set", name=f"{kind}set".lower()) for kind in _KINDS)
-    bodies, joints, markers = (ET.SubElement(one, "objects") for one in sets)
-    height = numbers([body.height_of_base_m()])
-    for one in body.tree():
-        set_inertia(ET.SubElement(bodies, "Body", name=one.segment), one.inertia)
-        _add_joint(joints, one, height)
-    for name, segment, place in body.markers():
-        on = f"/bodyset/{segment}"
-        parts = {"socket_parent_frame": on, "location": numbers(place), "fixed": "true"}
-        add_texts(ET.SubElement(markers, "Marker", name=name), parts)
-    return xml_text(document)
-
-
-def set_inertia(element: ET.Element, inertia: Inertia) -> None:
-    """Write mass, mass centre and inertia about it (xx yy zz xy xz yz) of a ``Body``."""
-    values = inertia.readable()
-    parts = {"mass": values[:1], "mass_center": values[1:4], "inertia": values[4:]}
-    for tag, part in parts.items():
-        found = element.find(tag)
-        child = ET.SubElement(element, tag) if found is None else found
-        child.text = numbers(part)
-
-
-def add_texts(element: ET.Element, texts: Mapping[str, str]) -> None:
-    """An element with a text below another, for each tag."""
-    for tag, text in texts.items():
-        ET.SubElement(element, tag).text = text
-
-
-def _add_joint(joints: ET.Element, one: BodyOnJoint, height: str) -> None:
-    """``height`` is where the base stands at first [m]."""
-    joint = ET.SubElement(joints, _JOINTS[one.kind], name=one.joint)
-    add_texts(joint, {"socket_parent_frame": "in_parent", "socket_child_frame": "in_child"})
-    coordinates = ET.SubElement(joint, "coordinates")
-    for part in COORDINATES[one.kind]:
-        coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{one.joint}_{part}")
-        if part == "ty":
-            ET.SubElement(coordinate, "default_value").text = height
-    frames = ET.SubElement(joint, "frames")
-    parent = f"/bodyset/{one.parent}" if one.parent else "/ground"
-    for frame, socket, tilt, place in (
-        ("in_parent", parent, one.parent_tilt_rad, one.place_m),
-        ("in_child", f"/bodyset/{one.segment}", one.child_tilt_rad, np.zeros(3)),
-    ):
-        offset = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
-        turned = {"translation": numbers(place), "orientation": numbers([tilt, 0.0, 0.0])}
-        add_texts(offset, {"socket_parent": socket} | turned)
-    if one.kind != "revolute":
-        _add_transform(joint, one.joint, one.kind)
-
-
-def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
-    """Three turns, and in the free joint three ways: one coordinate each; else zero."""
-    transform = ET.SubElement(joint, "SpatialTransform")
-    parts = (*COORDINATES["spherical"], "tx", "ty", "tz")
-    for number, part in enumerate(parts):
-        what = "rotation" if number < 3 else "translation"
-        one = ET.SubElement(transform, "TransformAxis", name=f"{what}{number % 3 + 1}")
-        is_free = part in COORDINATES[kind]
-        if is_free:
-            ET.SubElement(one, "coordinates").text = f"{name}_{part}"
-        ET.SubElement(one, "axis").text = numbers(AXES[part[1]])
-        function = ET.SubElement(one, "LinearFunction" if is_free else "Constant", name="function")
-        tag, value = ("coefficients", [1.0, 0.0]) if is_free else ("value", [0.0])
-        ET.SubElement(function, tag).text = numbers(value)
-
-
-# --- a model that somebody gives ------------------------------------------------------------------
-
 
 _BODIES = "Model/BodySet/objects/Body"
 
@@ -239,13 +143,23 @@ def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson
     document = deepcopy(model.document)
     for element in document.iterfind(_BODIES):
         if element.attrib["name"] in changed:
-            set_inertia(element, changed[element.attrib["name"]])
+            _set_inertia(element, changed[element.attrib["name"]])
     untouched = {name: mass for name, mass in model.masses_kg.items() if name not in changed}
     sentence = _sentence(misfit, untouched)
     lines = (*person.made_of, f"map of bodies: {body_map.name}", sentence)
     document.insert(0, ET.Comment(xml_comment(lines)))
     text = ET.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
     return Replacement(text, misfit, untouched, sentence)
+
+
+def _set_inertia(element: ET.Element, inertia: Inertia) -> None:
+    """Write mass, mass centre and inertia about it (xx yy zz xy xz yz) of a ``Body``."""
+    values = inertia.readable()
+    parts = {"mass": values[:1], "mass_center": values[1:4], "inertia": values[4:]}
+    for tag, part in parts.items():
+        found = element.find(tag)
+        child = ET.SubElement(element, tag) if found is None else found
+        child.text = numbers(part)
 
 
 def _sentence(misfit_m: dict[str, float], untouched: dict[str, float]) -> str:

@@ -108,6 +108,7 @@ FAULTS = {
     "turned by 270 degrees": (of_c3d, {"turn": 3}, "270 degrees"),
     "N m taken for N mm": (of_c3d, {"moment_scale": 1e-3}, "N m, a thousand times"),
     "N mm taken for N m": (of_c3d, {"moment_scale": 1e3}, "N mm"),
+    "N cm taken for N mm": (of_c3d, {"moment_scale": 1e-1}, "10 times what their unit"),
     "ORIGIN is a place in the lab": (
         of_c3d,
         {"origin_m": (0.0, 0.0, -0.04), "stated_origin_m": PLACE_OF_LAB},

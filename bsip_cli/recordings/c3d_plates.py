@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -238,44 +238,57 @@ def _without_place(stated: PlateDescription) -> tuple[PlateDescription, list[Fin
 
 def _channel_table(content: Content) -> tuple[np.ndarray, list[Finding]]:
     """FORCE_PLATFORM:CHANNEL, (channels, plates). Where the labels of the channels contradict it as
-    the format wants it, and agree with one other way to write it, that one counts."""
-    group = content.group("FORCE_PLATFORM")
-    table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
-    table = table[:, None] if table.ndim == 1 else table
+    the format wants it, and agree with one other way to write it, that one counts; where they agree
+    with none and it names channels that are not there, the first that names some for all plates."""
+    group, n_analog = content.group("FORCE_PLATFORM"), len(content.analog)
+    written = np.atleast_1d(whole_numbers(group, "CHANNEL"))
+    kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
+    table = written[:, None] if written.ndim == 1 else written
     if table.ndim != 2:
         return np.zeros((0, 0), int), []
-    by_rows = np.ravel(table, order="F").reshape(table.shape)
-    ways = {
+    orders = {
         "": table,
-        "counted from 0": table + 1,
-        "stored by rows": by_rows,
-        "stored by rows and counted from 0": by_rows + 1,
+        "stored by rows": np.ravel(table, order="F").reshape(table.shape),
         "stored with a row for each plate": table.T,
-        "stored with a row for each plate and counted from 0": table.T + 1,
     }
-    labels = texts(content.group("ANALOG"), "LABELS")[: len(content.analog)]
+    if table.shape[1] == 1 and kinds and not len(table) % len(kinds):
+        orders["stored as one list"] = table.reshape(len(kinds), -1).T
+    shifts, least = {"": 0, "counted from 0": 1}, int(table.min(initial=n_analog))
+    if table.max(initial=0) - least + 1 == n_analog:  # of a file from which the first were cut
+        shifts[f"counted from {least}"] = 1 - least
+    ways = {
+        " and ".join(filter(None, (order, count))): one + shift
+        for (order, one), (count, shift) in product(orders.items(), shifts.items())
+    }
+    labels = texts(content.group("ANALOG"), "LABELS")[:n_analog]
     measuring = ["".join((_AXIS.findall(label.upper()) or [""])[-1]) for label in labels]
-    kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
-    fitting = [words for words, one in ways.items() if _fits_labels(one, kinds, measuring)]
+    by = "by the labels of its channels "
+    fitting = [words for words, one in ways.items() if _fits(one, kinds, n_analog, measuring)]
+    if not fitting:
+        by = "by the number of its channels "
+        fitting = [words for words, one in ways.items() if _fits(one, kinds, n_analog)][:1]
     are_one = all(np.array_equal(ways[words], ways[fitting[0]]) for words in fitting)
     if not fitting or not fitting[0] or not are_one:
         return table, []
-    found = f"by the labels of its channels FORCE_PLATFORM:CHANNEL is {fitting[0]}"
+    found = f"{by}FORCE_PLATFORM:CHANNEL is {fitting[0]}"
     expected = "counted from 1, a column for each plate"
     about = Finding("plate", "", found, expected, "read it so", "corrected")
     return ways[fitting[0]], [about]
 
 
-def _fits_labels(table: np.ndarray, kinds: Sequence[int], measuring: Sequence[str]) -> bool:
-    """Whether the channels of all plates measure by their labels what the plates' types want."""
+def _fits(
+    table: np.ndarray, kinds: Sequence[int], n_analog: int, measuring: Sequence[str] = ()
+) -> bool:
+    """Whether all plates have channels that are there and that measure by their labels, if these
+    are asked, what the plates' types want."""
     for index, kind in enumerate(kinds):
         wanted = [name[:2].upper().replace("T", "M") for name in CHANNELS_OF.get(kind, ())]
         if not wanted or len(table) < len(wanted) or table.shape[1] <= index:
             return False
         rows = table[: len(wanted), index] - 1
-        if rows.min() < 0 or rows.max() >= len(measuring):
+        if rows.min() < 0 or rows.max() >= (len(measuring) or n_analog):
             return False
-        if [measuring[row].replace("T", "M") for row in rows] != wanted:
+        if measuring and [measuring[row].replace("T", "M") for row in rows] != wanted:
             return False
     return bool(kinds)
 

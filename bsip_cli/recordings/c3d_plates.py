@@ -16,7 +16,9 @@ from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_wrench import lost_baseline
 from bsip_cli.recordings.plates import (
+    CHANNELS,
     CHANNELS_OF,
+    LOADED_N,
     PlateDescription,
     corners_are_plausible,
     measured,
@@ -53,7 +55,7 @@ def read_plates(
 
     ``length_unit_m`` is the size of the unit of points, corners and origins.
     """
-    plates, about_samples = [], []
+    plates, about_samples, filled = [], [], []
     group = content.group("FORCE_PLATFORM")
     stated = _stated_plates(group)
     table, findings = _channel_table(content)
@@ -68,9 +70,13 @@ def read_plates(
             action = "left the plate out; export the trial with its force plates set up"
             findings.append(Finding("plate", str(index + 1), *why.words, action, "excluded"))
             continue
+        filled.append((description, rows, channels))
+        findings += [*about, *about_units]
+    upright, about_axes = _upright([(one.kind, channels) for one, _, channels in filled])
+    findings += about_axes
+    for (description, rows, _), channels in zip(filled, upright, strict=True):
         plate, faulty = _plate(content, description, rows, channels, rotation_world_lab)
         plates.append(plate)
-        findings += [*about, *about_units]
         about_samples += faulty
     if len(plates) > stated:
         found, expected = f"FORCE_PLATFORM:USED is {stated}", f"the {len(plates)} it describes"
@@ -327,6 +333,28 @@ def _channel_rows(table: np.ndarray, kind: int, index: int, content: Content) ->
             found = f"its {names[i]} and {names[j]} hold the same numbers"
             raise _UnusablePlateError(found, "an analog channel for each in FORCE_PLATFORM:CHANNEL")
     return rows
+
+
+def _upright(plates: Sequence[tuple[int, np.ndarray]]) -> tuple[list[np.ndarray], list[Finding]]:
+    """Channels (n, k) of plates, by their types, with the axes named so that Z bears the load: some
+    write these in the axes of a laboratory whose X or Y is up, beside corners. Nobody stands on a
+    plate by level forces alone."""
+    channels, bearing = [one for _, one in plates], set[int]()
+    own = [k for k, (kind, _) in enumerate(plates) if CHANNELS_OF[kind] == CHANNELS]
+    for k in own:
+        force = np.abs(channels[k][:, :3])
+        loaded = np.linalg.norm(force, axis=1) > LOADED_N
+        if loaded.any():
+            bearing.add(int(np.argmax(force[loaded].mean(axis=0))))
+    if len(bearing) != 1 or bearing == {2}:
+        return channels, []
+    (up,) = bearing
+    order = [(up + 1 + axis) % 3 for axis in range(3)]
+    for k in own:
+        channels[k] = channels[k][:, [*order, *(3 + axis for axis in order)]]
+    found = f"{CHANNELS[order[2]]} of the plates bears the load, and Fz does not"
+    action = f"took {', '.join(CHANNELS[axis] for axis in order)} for Fx, Fy, Fz, and moments so"
+    return channels, [Finding("plate", "", found, "Fz across the plate", action, "corrected")]
 
 
 def _in_si(

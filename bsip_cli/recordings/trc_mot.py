@@ -113,7 +113,7 @@ def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, 
         if loaded.any():
             mean = np.abs(force[loaded]).mean(axis=0)
             of_forces = scene.Up(int(np.argmax(mean)), 1, "the forces point there")
-            if by_labels and {by_labels.axis, of_forces.axis} == {1, 2}:
+            if by_labels and by_labels.axis != of_forces.axis:
                 by_segment = scene.by_segment(
                     trc.labels, positions_m @ scene.rotation_to_z_up(by_labels).T
                 )

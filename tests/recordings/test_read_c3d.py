@@ -16,6 +16,7 @@ from bsip_cli.recordings.read import open_recording, read_recording
 from tests.recordings.recording_writers import (
     CORNERS_M,
     ORIGIN_M,
+    X_UP_FROM_Z_UP,
     Y_UP_FROM_Z_UP,
     PlateSpec,
     standing_markers,
@@ -284,20 +285,35 @@ def test_y_up_laboratory_is_turned(tmp_path):
     _check_wrench(recording)
 
 
+@pytest.mark.parametrize("turn", [Y_UP_FROM_Z_UP.T, X_UP_FROM_Z_UP.T])
 @pytest.mark.parametrize("whose", ["markers", "plates"])
-def test_plates_in_other_axes_than_the_markers_are_turned_by_themselves(tmp_path, whose):
+def test_plates_in_other_axes_than_the_markers_are_turned_by_themselves(tmp_path, whose, turn):
+    aside_m = np.array([0.8, 0.0, 0.0])  # where heights are those of no one who lies there
     markers, labels = standing_markers(N)
     force, moment = standing_wrench(N * RATIO)
-    turn = Y_UP_FROM_Z_UP.T
-    spec = PlateSpec(force, moment, corners_m=CORNERS_M)
-    if whose == "markers":
-        markers = markers @ turn
-    else:
-        spec = PlateSpec(force @ turn, moment @ turn, corners_m=CORNERS_M @ turn)
+    moment, expected = moment + np.cross(aside_m, force), markers + aside_m
+    matrices = (turn, np.eye(3)) if whose == "markers" else (np.eye(3), turn)
+    markers, corners = expected @ matrices[0], (CORNERS_M + aside_m) @ matrices[1]
+    spec = PlateSpec(force @ matrices[1], moment @ matrices[1], corners_m=corners)
     recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, labels, [spec]))
     (about,) = [finding for finding in recording.findings if finding.check == "up_axis"]
     assert about.expected == "one laboratory frame"
-    np.testing.assert_allclose(recording.markers_m, standing_markers(N)[0], atol=1e-6)
+    np.testing.assert_allclose(recording.markers_m, expected, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-3)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-3)
+
+
+@pytest.mark.parametrize("up", [0, 1])
+def test_channels_in_axes_of_which_another_one_is_up(tmp_path, up):
+    """Corners as the format wants them, and Fx or Fy across the plate."""
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = ezc3d.c3d(str(path))
+    six = content["data"]["analogs"][:, :6]
+    content["data"]["analogs"][:, :6] = np.roll(six.reshape(2, 3, -1), up + 1, 1).reshape(1, 6, -1)
+    content.write(str(path))
+    recording = read_recording(path)
+    (said,) = (f.found for f in recording.findings if f.check == "plate")
+    assert said.startswith(f"{('Fx', 'Fy')[up]} of the plates bears the load")
     _check_wrench(recording)
 
 

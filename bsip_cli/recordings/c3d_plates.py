@@ -22,6 +22,7 @@ from bsip_cli.recordings.plates import (
     PlateDescription,
     corners_are_plausible,
     measured,
+    parallelogram_gap,
     side_lengths,
 )
 from bsip_cli.recordings.plates_of_files import C3dPlate
@@ -78,6 +79,9 @@ def read_plates(
         plate, faulty = _plate(content, description, rows, channels, rotation_world_lab)
         plates.append(plate)
         about_samples += faulty
+    if _corners_by_rows(group):
+        found, expected = "FORCE_PLATFORM:CORNERS has a row for each corner", "a column for each"
+        findings.append(Finding("plate", "", found, expected, "read it so", "corrected"))
     if len(plates) > stated:
         found, expected = f"FORCE_PLATFORM:USED is {stated}", f"the {len(plates)} it describes"
         findings.append(Finding("plate", "", found, expected, "read them", "corrected"))
@@ -88,7 +92,7 @@ def _about_places(descriptions: Sequence[PlateDescription]) -> list[Finding]:
     """Corners that are no rectangle, and those of another plate."""
     said = []
     for one in descriptions:
-        gap_m = np.linalg.norm(one.corners_m[::2].sum(axis=0) - one.corners_m[1::2].sum(axis=0))
+        gap_m = parallelogram_gap(one.corners_m)
         if gap_m > _PARALLEL * side_lengths(one.corners_m).max():
             found = f"its corners are {1e3 * gap_m:.0f} mm away from a rectangle's"
             said.append((one.name, found, "a rectangle"))
@@ -107,9 +111,14 @@ def plate_surfaces(group: Group, length_unit_m: float) -> list[np.ndarray]:
 
 
 def _all_corners(group: Group) -> np.ndarray:
-    """(n, 4, 3), as written."""
-    flat = np.ravel(numbers(group, "CORNERS"), order="F")
+    """(n, 4, 3), as written; also where rows stand for corners, which is no way of the format."""
+    written = numbers(group, "CORNERS")
+    flat = np.ravel(written.swapaxes(0, 1) if _corners_by_rows(group) else written, order="F")
     return flat[: len(flat) // 12 * 12].reshape(-1, 4, 3)
+
+
+def _corners_by_rows(group: Group) -> bool:
+    return numbers(group, "CORNERS").shape[:2] == (4, 3)
 
 
 def _n_plates(group: Group) -> int:
@@ -170,7 +179,8 @@ def _description(
         raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
     if (kind := int(kinds[index])) not in CHANNELS_OF:
         raise _UnusablePlateError(f"force platform type {kind}", "types 1 to 4")
-    written = _numbers_of(group, "CORNERS", index, 12).reshape(4, 3)
+    _numbers_of(group, "CORNERS", index, 12)
+    written = _all_corners(group)[index]
     plate_unit_m, about = _plate_unit(written, length_unit_m, name)
     origin = _numbers_of(group, "ORIGIN", index, 3)
     size_m = side_lengths(written * plate_unit_m).max()  # sensors lie no deeper, no farther aside

@@ -37,7 +37,11 @@ from bsip_cli.recordings.text_tables import (
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
-_TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
+_TIME = re.compile(
+    r"(?:(?:abs|rel|elapsed)\w*[\W_]+)?(?:times?|zeit|temps|tiempo|tempo)(?![a-z])"
+    r"|(?:t|sec(?:onds?)?)$",
+    re.IGNORECASE,
+)
 _AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_SHOWN = 12
@@ -109,7 +113,13 @@ def read_mot(path: Path, force_N: float = 1.0) -> Mot:
 def _names(line: str) -> bool:
     """Whether a line names columns: files without 'endheader'."""
     words = parted(line, separator_of(line))
-    return len(words) > 3 and _TIME.match(words[0]) is not None
+    return len(words) > 3 and _time_column(words) is not None
+
+
+def _time_column(names: list[str]) -> int | None:
+    """The first, or the second behind numbers of frames."""
+    first = [k for k, name in enumerate(names[:2]) if _TIME.match(name)]
+    return first[0] if first and meaning_of(names[0]) is None else None
 
 
 def _no_table(path: Path) -> BadDataError:
@@ -128,19 +138,21 @@ def _read_table(lines: Iterator[str], first: str, path: Path, force_N: float) ->
         raise _no_table(path)
     alone = without_end(parted(first, mark)), dialect_of(mark, top)
     names, dialect = next(agreeing(first, top), alone)
-    if not names or not _TIME.match(names[0]):
+    if (first_column := _time_column(names)) is None:
         found = f"first column '{printable(names[0][:40]) if names else ''}'"
         raise refusal(path, found, "time", _AGAIN)
     said = parted(units, separator_of(units))
-    values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
+    values, digits, is_cut = _values(chain(top, rows), len(names), first_column, dialect, path)
     units_of = said if len(said) == len(names) else [""] * len(names)
+    names, units_of = names[first_column:], units_of[first_column:]
     return _Table(names, units_of, values, digits, is_cut, dialect, force_N)
 
 
 def _values(
-    rows: Iterator[str], n_columns: int, dialect: Dialect, path: Path
+    rows: Iterator[str], n_columns: int, first_column: int, dialect: Dialect, path: Path
 ) -> tuple[np.ndarray, LastDigit, bool]:
-    """(n_rows, n_columns), eight bytes for each cell and no more; whether the last row is cut."""
+    """(n_rows, n_columns) without those before the first, eight bytes for each cell and no more;
+    whether the last row is cut."""
     values, digits, short, goes_on = array("d"), LastDigit(), 0, False
     for row in rows:
         if goes_on := short > 0:
@@ -151,6 +163,7 @@ def _values(
         if len(cells) != n_columns:
             short = len(cells)
             continue
+        cells = cells[first_column:]
         row_values, words = values_of(cells)
         if words:
             found = f"its table cannot be read: '{printable(words[0][:40])}' is no number"
@@ -162,7 +175,7 @@ def _values(
     if short and not is_cut:
         expected = f"{n_columns}, as many as there are columns"
         raise refusal(path, f"a row of {short} cells", expected, _AGAIN)
-    table = np.array(values).reshape(-1, n_columns)
+    table = np.array(values).reshape(-1, n_columns - first_column)
     table[~np.isfinite(table)] = np.nan
     return table, digits, is_cut
 

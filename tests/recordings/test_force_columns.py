@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -243,6 +244,11 @@ EDITS = {
         part.replace("\t", "  ") if k else part for k, part in enumerate(text.split("Fz2\n0"))
     ),
     "time in capitals": lambda text: text.replace("\ntime\t", "\nTIME\t"),
+    "time of a program": lambda text: text.replace("\ntime\t", "\nAbs Time (s)\t"),
+    "time in German": lambda text: text.replace("\ntime\t", "\nZeit [s]\t"),
+    "numbers of frames before the time": lambda text: re.sub(
+        r"(?m)^(?=0\.|0\t)", "7\t", text.replace("\ntime\t", "\nFrame#\tTime_s\t")
+    ),
     "carriage returns": lambda text: text.replace("\n", "\r\n"),
 }
 

@@ -11,7 +11,7 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plates import CHANNELS_OF, PlateDescription
+from bsip_cli.recordings.plates import CHANNELS_OF, PlateDescription, corners_are_plausible
 from bsip_cli.recordings.read import open_recording, read_recording
 from tests.recordings.recording_writers import (
     CORNERS_M,
@@ -185,6 +185,23 @@ def test_channels_that_are_listed_otherwise(tmp_path, kind, table, words, label)
         for one, other in zip(some.plates, sound.plates, strict=True):
             np.testing.assert_allclose(one.moment_Nm, other.moment_Nm, atol=1e-3)
         assert any(words in f.found for f in some.findings if f.check == "plate")
+
+
+def test_corners_with_a_row_for_each(tmp_path):
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = ezc3d.c3d(str(path))
+    corners = content["parameters"]["FORCE_PLATFORM"]["CORNERS"]
+    corners["value"] = corners["value"].swapaxes(0, 1)
+    content.write(str(path))
+    recording = read_recording(path)
+    assert _levels(recording, "plate") == ["corrected"]
+    _check_wrench(recording)
+
+
+def test_corners_of_equal_diagonals_may_still_be_no_plate():
+    away = np.array([1.0, 0.0, 0.0])
+    crossed = CORNERS_M + np.array([away, 0 * away, away, 0 * away])
+    assert not corners_are_plausible(crossed)
 
 
 def test_more_plates_are_described_than_used(tmp_path):

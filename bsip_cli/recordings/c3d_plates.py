@@ -257,9 +257,9 @@ def _channel_table(content: Content) -> tuple[np.ndarray, list[Finding]]:
     the format wants it, and agree with one other way to write it, that one counts; where they agree
     with none and it names channels that are not there, the first that names some for all plates."""
     group, n_analog = content.group("FORCE_PLATFORM"), len(content.analog)
-    written = np.atleast_1d(whole_numbers(group, "CHANNEL"))
+    table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
+    table = table[:, None] if table.ndim == 1 else table
     kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
-    table = written[:, None] if written.ndim == 1 else written
     if table.ndim != 2:
         return np.zeros((0, 0), int), []
     orders = {

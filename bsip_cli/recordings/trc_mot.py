@@ -141,7 +141,7 @@ def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     near = cKDTree(seen[:, :2])
     sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
     ways = product((points, points.conj()), sizes, range(4))
-    turned = (seen_so * size * 1j**quarter for seen_so, size, quarter in ways)
+    turned = (places * size * 1j**quarter for places, size, quarter in ways)
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
     return any(np.median(distance) < BESIDE_M for distance in distances)
 
@@ -218,6 +218,8 @@ def _source(
         f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
     )
     none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
+    if samples_s[-1] - grid.samples_s[-1] > 1 / markers.rate_hz:
+        expected += "; forces after rows that were lost in between come too early"
     findings += [
         replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
         for one in sample_findings(force.name, samples, grid.rate_hz)

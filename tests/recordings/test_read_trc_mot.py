@@ -198,6 +198,15 @@ def test_markers_and_forces_are_turned_each_in_its_own_way(tmp_path, markers, fo
     np.testing.assert_allclose(recording.plates[0].moment_Nm, MOMENT, atol=1e-5)
 
 
+@pytest.mark.parametrize("lost", [0, 6])
+def test_forces_that_end_before_the_markers_may_have_lost_rows(tmp_path, lost):
+    columns = {
+        name: np.delete(x, slice(20, 20 + lost)) for name, x in _columns(FORCE, MOMENT).items()
+    }
+    said = [f.expected for f in _read(tmp_path, columns).findings if f.check == "analog_nan"]
+    assert ["come too early" in one for one in said] == [True] * (lost > 0)
+
+
 def test_who_lies_on_the_plates_keeps_the_forces_axes(tmp_path):
     """Head and feet along the laboratory's Z, forces along Y: no conversion."""
     lying = MARKERS @ np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])

@@ -148,7 +148,7 @@ class C3dPlate:
             abouts += ("reversed", "centred")
         for scale, about, turn, mirrored in product(scales, abouts, range(4), (False, True)):
             yield PlateReading(moment_scale=scale, about=about, turn=turn, mirrored=mirrored)
-        for scale in RARE_SCALES if kind != 3 else ():
+        for scale in RARE_SCALES if kind in (2, 4) else ():
             yield PlateReading(moment_scale=scale)
         for fault in faults_of_channels(ALIKE[kind]):
             yield PlateReading(channels=fault)

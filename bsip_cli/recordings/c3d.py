@@ -87,12 +87,14 @@ def _ups(
 
         def stand(up: scene.Up, up_of_plates: scene.Up) -> bool:
             turn, of_plates = map(scene.rotation_to_z_up, (up, up_of_plates))
-            turned = [corners @ of_plates.T for corners in surfaces]
-            return _stands_on(labels, positions_m @ turn.T, turned)
+            level = [corners @ of_plates.T for corners in surfaces]
+            quarters = scene.QUARTERS if up != up_of_plates else [np.eye(3)]
+            turned = ([corners @ quarter.T for corners in level] for quarter in quarters)
+            return any(_stands_on(labels, positions_m @ turn.T, one) for one in turned)
 
         if (
             by_labels
-            and {by_labels.axis, of_plates.axis} == {1, 2}
+            and by_labels.axis != of_plates.axis
             and not (surface and stand(surface, surface))
             and stand(by_labels, of_plates)
         ):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -16,10 +16,13 @@ from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_wrench import lost_baseline
 from bsip_cli.recordings.plates import (
+    CHANNELS,
     CHANNELS_OF,
+    LOADED_N,
     PlateDescription,
     corners_are_plausible,
     measured,
+    parallelogram_gap,
     side_lengths,
 )
 from bsip_cli.recordings.plates_of_files import C3dPlate
@@ -53,7 +56,7 @@ def read_plates(
 
     ``length_unit_m`` is the size of the unit of points, corners and origins.
     """
-    plates, about_samples = [], []
+    plates, about_samples, filled = [], [], []
     group = content.group("FORCE_PLATFORM")
     stated = _stated_plates(group)
     table, findings = _channel_table(content)
@@ -68,10 +71,17 @@ def read_plates(
             action = "left the plate out; export the trial with its force plates set up"
             findings.append(Finding("plate", str(index + 1), *why.words, action, "excluded"))
             continue
+        filled.append((description, rows, channels))
+        findings += [*about, *about_units]
+    upright, about_axes = _upright([(one.kind, channels) for one, _, channels in filled])
+    findings += about_axes
+    for (description, rows, _), channels in zip(filled, upright, strict=True):
         plate, faulty = _plate(content, description, rows, channels, rotation_world_lab)
         plates.append(plate)
-        findings += [*about, *about_units]
         about_samples += faulty
+    if _corners_by_rows(group):
+        found, expected = "FORCE_PLATFORM:CORNERS has a row for each corner", "a column for each"
+        findings.append(Finding("plate", "", found, expected, "read it so", "corrected"))
     if len(plates) > stated:
         found, expected = f"FORCE_PLATFORM:USED is {stated}", f"the {len(plates)} it describes"
         findings.append(Finding("plate", "", found, expected, "read them", "corrected"))
@@ -82,7 +92,7 @@ def _about_places(descriptions: Sequence[PlateDescription]) -> list[Finding]:
     """Corners that are no rectangle, and those of another plate."""
     said = []
     for one in descriptions:
-        gap_m = np.linalg.norm(one.corners_m[::2].sum(axis=0) - one.corners_m[1::2].sum(axis=0))
+        gap_m = parallelogram_gap(one.corners_m)
         if gap_m > _PARALLEL * side_lengths(one.corners_m).max():
             found = f"its corners are {1e3 * gap_m:.0f} mm away from a rectangle's"
             said.append((one.name, found, "a rectangle"))
@@ -101,9 +111,14 @@ def plate_surfaces(group: Group, length_unit_m: float) -> list[np.ndarray]:
 
 
 def _all_corners(group: Group) -> np.ndarray:
-    """(n, 4, 3), as written."""
-    flat = np.ravel(numbers(group, "CORNERS"), order="F")
+    """(n, 4, 3), as written; also where rows stand for corners, which is no way of the format."""
+    written = numbers(group, "CORNERS")
+    flat = np.ravel(written.swapaxes(0, 1) if _corners_by_rows(group) else written, order="F")
     return flat[: len(flat) // 12 * 12].reshape(-1, 4, 3)
+
+
+def _corners_by_rows(group: Group) -> bool:
+    return numbers(group, "CORNERS").shape[:2] == (4, 3)
 
 
 def _n_plates(group: Group) -> int:
@@ -164,7 +179,8 @@ def _description(
         raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
     if (kind := int(kinds[index])) not in CHANNELS_OF:
         raise _UnusablePlateError(f"force platform type {kind}", "types 1 to 4")
-    written = _numbers_of(group, "CORNERS", index, 12).reshape(4, 3)
+    _numbers_of(group, "CORNERS", index, 12)
+    written = _all_corners(group)[index]
     plate_unit_m, about = _plate_unit(written, length_unit_m, name)
     origin = _numbers_of(group, "ORIGIN", index, 3)
     size_m = side_lengths(written * plate_unit_m).max()  # sensors lie no deeper, no farther aside
@@ -238,44 +254,57 @@ def _without_place(stated: PlateDescription) -> tuple[PlateDescription, list[Fin
 
 def _channel_table(content: Content) -> tuple[np.ndarray, list[Finding]]:
     """FORCE_PLATFORM:CHANNEL, (channels, plates). Where the labels of the channels contradict it as
-    the format wants it, and agree with one other way to write it, that one counts."""
-    group = content.group("FORCE_PLATFORM")
+    the format wants it, and agree with one other way to write it, that one counts; where they agree
+    with none and it names channels that are not there, the first that names some for all plates."""
+    group, n_analog = content.group("FORCE_PLATFORM"), len(content.analog)
     table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
     table = table[:, None] if table.ndim == 1 else table
+    kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
     if table.ndim != 2:
         return np.zeros((0, 0), int), []
-    by_rows = np.ravel(table, order="F").reshape(table.shape)
-    ways = {
+    orders = {
         "": table,
-        "counted from 0": table + 1,
-        "stored by rows": by_rows,
-        "stored by rows and counted from 0": by_rows + 1,
+        "stored by rows": np.ravel(table, order="F").reshape(table.shape),
         "stored with a row for each plate": table.T,
-        "stored with a row for each plate and counted from 0": table.T + 1,
     }
-    labels = texts(content.group("ANALOG"), "LABELS")[: len(content.analog)]
+    if table.shape[1] == 1 and kinds and not len(table) % len(kinds):
+        orders["stored as one list"] = table.reshape(len(kinds), -1).T
+    shifts, least = {"": 0, "counted from 0": 1}, int(table.min(initial=n_analog))
+    if table.max(initial=0) - least + 1 == n_analog:  # of a file from which the first were cut
+        shifts[f"counted from {least}"] = 1 - least
+    ways = {
+        " and ".join(filter(None, (order, count))): one + shift
+        for (order, one), (count, shift) in product(orders.items(), shifts.items())
+    }
+    labels = texts(content.group("ANALOG"), "LABELS")[:n_analog]
     measuring = ["".join((_AXIS.findall(label.upper()) or [""])[-1]) for label in labels]
-    kinds = np.ravel(whole_numbers(group, "TYPE"))[: _n_plates(group)].tolist()
-    fitting = [words for words, one in ways.items() if _fits_labels(one, kinds, measuring)]
+    by = "by the labels of its channels "
+    fitting = [words for words, one in ways.items() if _fits(one, kinds, n_analog, measuring)]
+    if not fitting:
+        by = "by the number of its channels "
+        fitting = [words for words, one in ways.items() if _fits(one, kinds, n_analog)][:1]
     are_one = all(np.array_equal(ways[words], ways[fitting[0]]) for words in fitting)
     if not fitting or not fitting[0] or not are_one:
         return table, []
-    found = f"by the labels of its channels FORCE_PLATFORM:CHANNEL is {fitting[0]}"
+    found = f"{by}FORCE_PLATFORM:CHANNEL is {fitting[0]}"
     expected = "counted from 1, a column for each plate"
     about = Finding("plate", "", found, expected, "read it so", "corrected")
     return ways[fitting[0]], [about]
 
 
-def _fits_labels(table: np.ndarray, kinds: Sequence[int], measuring: Sequence[str]) -> bool:
-    """Whether the channels of all plates measure by their labels what the plates' types want."""
+def _fits(
+    table: np.ndarray, kinds: Sequence[int], n_analog: int, measuring: Sequence[str] = ()
+) -> bool:
+    """Whether all plates have channels that are there and that measure by their labels, if these
+    are asked, what the plates' types want."""
     for index, kind in enumerate(kinds):
         wanted = [name[:2].upper().replace("T", "M") for name in CHANNELS_OF.get(kind, ())]
         if not wanted or len(table) < len(wanted) or table.shape[1] <= index:
             return False
         rows = table[: len(wanted), index] - 1
-        if rows.min() < 0 or rows.max() >= len(measuring):
+        if rows.min() < 0 or rows.max() >= (len(measuring) or n_analog):
             return False
-        if [measuring[row].replace("T", "M") for row in rows] != wanted:
+        if measuring and [measuring[row].replace("T", "M") for row in rows] != wanted:
             return False
     return bool(kinds)
 
@@ -314,6 +343,28 @@ def _channel_rows(table: np.ndarray, kind: int, index: int, content: Content) ->
             found = f"its {names[i]} and {names[j]} hold the same numbers"
             raise _UnusablePlateError(found, "an analog channel for each in FORCE_PLATFORM:CHANNEL")
     return rows
+
+
+def _upright(plates: Sequence[tuple[int, np.ndarray]]) -> tuple[list[np.ndarray], list[Finding]]:
+    """Channels (n, k) of plates, by their types, with the axes named so that Z bears the load: some
+    write these in the axes of a laboratory whose X or Y is up, beside corners. Nobody stands on a
+    plate by level forces alone."""
+    channels, bearing = [one for _, one in plates], set[int]()
+    own = [k for k, (kind, _) in enumerate(plates) if CHANNELS_OF[kind] == CHANNELS]
+    for k in own:
+        force = np.abs(channels[k][:, :3])
+        loaded = np.linalg.norm(force, axis=1) > LOADED_N
+        if loaded.any():
+            bearing.add(int(np.argmax(force[loaded].mean(axis=0))))
+    if len(bearing) != 1 or bearing == {2}:
+        return channels, []
+    (up,) = bearing
+    order = [(up + 1 + axis) % 3 for axis in range(3)]
+    for k in own:
+        channels[k] = channels[k][:, [*order, *(3 + axis for axis in order)]]
+    found = f"{CHANNELS[order[2]]} of the plates bears the load, and Fz does not"
+    action = f"took {', '.join(CHANNELS[axis] for axis in order)} for Fx, Fy, Fz, and moments so"
+    return channels, [Finding("plate", "", found, "Fz across the plate", action, "corrected")]
 
 
 def _in_si(

@@ -16,7 +16,7 @@ from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plate_wrench import FrameWrench
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
-from bsip_cli.recordings.under_the_feet import BESIDE_M, lowest, outline
+from bsip_cli.recordings.under_the_feet import BESIDE_M, LOWEST_M, lowest, outline
 
 NO_MASS = (
     "whether something else bears the person (seat, box, hands) is not known: neither a stated "
@@ -201,6 +201,7 @@ class _Foot:
     height_m: np.ndarray  # (n_frames, k), over each marker's standing height; inf = unseen
     speed_m_s: np.ndarray  # (n_frames,), of the lowest marker
     seen: np.ndarray  # (n_frames,) bool
+    lowest_m: np.ndarray  # (n_frames,), height of the lowest marker, NaN where none is seen
 
     @classmethod
     def of(cls, markers_m: np.ndarray, rate_hz: float) -> _Foot:
@@ -208,12 +209,19 @@ class _Foot:
         known = np.isfinite(markers_m).all(axis=-1)
         height_m = np.where(known, markers_m[..., 2], np.nan)
         height = np.nan_to_num(height_m - lowest(height_m), nan=np.inf)
+        low_m = np.where(known, markers_m[..., 2], np.inf).min(axis=1, initial=np.inf)
         frames, reach = np.arange(len(markers_m)), max(1, round(0.02 * rate_hz))
         after, before = np.minimum(frames + reach, frames[-1:]), np.maximum(frames - reach, 0)
         span = np.maximum(after - before, 1)[:, None, None]  # about 40 ms
         velocity = (markers_m[after] - markers_m[before]) / span * rate_hz
         speed = np.linalg.norm(velocity, axis=-1)[frames, height.argmin(axis=1)]
-        return cls(markers_m[..., :2], height, np.nan_to_num(speed, nan=0.0), known.any(axis=1))
+        seen = known.any(axis=1)
+        low_m = np.where(seen, low_m, np.nan)
+        return cls(markers_m[..., :2], height, np.nan_to_num(speed, nan=0.0), seen, low_m)
+
+    def goes_below(self, corners_m: np.ndarray) -> bool:
+        """Whether a surface is a step to this foot, which also stands lower."""
+        return float(lowest(self.lowest_m[:, None])[0]) < corners_m[:, 2].mean() + LOWEST_M[0]
 
 
 def _touches(
@@ -221,15 +229,21 @@ def _touches(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
 
-    A foot on a moving belt is not slow: the load under it decides.
+    A foot on a moving belt is not slow, nor is one on a step as low as elsewhere: the load under it
+    decides.
     """
+    on_step = np.zeros(len(foot.seen), bool)
     near_load = np.zeros(len(foot.seen), bool)  # a marker is near the load of a plate
     for plate in plates:
         gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
         is_close = (np.nan_to_num(gap, nan=np.inf) < _COP_DISTANCE_M).any(axis=1)
-        near_load |= (plate.force_z_N > TOUCHED_N) & is_close
+        bears = (plate.force_z_N > TOUCHED_N) & is_close
+        near_load |= bears
+        if plate.corners_m is not None and foot.goes_below(plate.corners_m):
+            above = foot.lowest_m - plate.corners_m[:, 2].mean()
+            on_step |= bears & (above > LOWEST_M[0]) & (above < LOWEST_M[1])
     low = foot.height_m.min(axis=1) < _TOUCH_HEIGHT_M
-    touching = low & ((foot.speed_m_s < _TOUCH_SPEED_M_S) | near_load)
+    touching = (low & ((foot.speed_m_s < _TOUCH_SPEED_M_S) | near_load)) | on_step
     outlines = [plate.corners_m for plate in plates if plate.corners_m is not None]
     sole = foot.height_m < SOLE_HEIGHT_M
     on_some = ~sole if outlines else np.zeros_like(sole)

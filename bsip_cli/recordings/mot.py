@@ -37,10 +37,15 @@ from bsip_cli.recordings.text_tables import (
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
-_TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
+_TIME = re.compile(
+    r"(?:(?:abs|rel|elapsed)\w*[\W_]+)?(?:times?|zeit|temps|tiempo|tempo)(?![a-z])"
+    r"|(?:t|sec(?:onds?)?)$",
+    re.IGNORECASE,
+)
 _AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_SHOWN = 12
+_ZERO = -1  # the column of what is zero
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -108,7 +113,13 @@ def read_mot(path: Path, force_N: float = 1.0) -> Mot:
 def _names(line: str) -> bool:
     """Whether a line names columns: files without 'endheader'."""
     words = parted(line, separator_of(line))
-    return len(words) > 3 and _TIME.match(words[0]) is not None
+    return len(words) > 3 and _time_column(words) is not None
+
+
+def _time_column(names: list[str]) -> int | None:
+    """The first, or the second behind numbers of frames."""
+    first = [k for k, name in enumerate(names[:2]) if _TIME.match(name)]
+    return first[0] if first and meaning_of(names[0]) is None else None
 
 
 def _no_table(path: Path) -> BadDataError:
@@ -127,19 +138,21 @@ def _read_table(lines: Iterator[str], first: str, path: Path, force_N: float) ->
         raise _no_table(path)
     alone = without_end(parted(first, mark)), dialect_of(mark, top)
     names, dialect = next(agreeing(first, top), alone)
-    if not names or not _TIME.match(names[0]):
+    if (first_column := _time_column(names)) is None:
         found = f"first column '{printable(names[0][:40]) if names else ''}'"
         raise refusal(path, found, "time", _AGAIN)
     said = parted(units, separator_of(units))
-    values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
+    values, digits, is_cut = _values(chain(top, rows), len(names), first_column, dialect, path)
     units_of = said if len(said) == len(names) else [""] * len(names)
+    names, units_of = names[first_column:], units_of[first_column:]
     return _Table(names, units_of, values, digits, is_cut, dialect, force_N)
 
 
 def _values(
-    rows: Iterator[str], n_columns: int, dialect: Dialect, path: Path
+    rows: Iterator[str], n_columns: int, first_column: int, dialect: Dialect, path: Path
 ) -> tuple[np.ndarray, LastDigit, bool]:
-    """(n_rows, n_columns), eight bytes for each cell and no more; whether the last row is cut."""
+    """(n_rows, n_columns) without those before the first, eight bytes for each cell and no more;
+    whether the last row is cut."""
     values, digits, short, goes_on = array("d"), LastDigit(), 0, False
     for row in rows:
         if goes_on := short > 0:
@@ -150,6 +163,7 @@ def _values(
         if len(cells) != n_columns:
             short = len(cells)
             continue
+        cells = cells[first_column:]
         row_values, words = values_of(cells)
         if words:
             found = f"its table cannot be read: '{printable(words[0][:40])}' is no number"
@@ -161,7 +175,7 @@ def _values(
     if short and not is_cut:
         expected = f"{n_columns}, as many as there are columns"
         raise refusal(path, f"a row of {short} cells", expected, _AGAIN)
-    table = np.array(values).reshape(-1, n_columns)
+    table = np.array(values).reshape(-1, n_columns - first_column)
     table[~np.isfinite(table)] = np.nan
     return table, digits, is_cut
 
@@ -196,9 +210,18 @@ _MEANINGS = _WORDS | _SHORT | {"fp": "ground"}
 _LINKS = "of|de|di|do|da|du|des|del|della|le|la|der|am|sol|solo|axis|eje|axe|achse|asse|eixo"
 _LINKS += "|(?:d|l|dell)(?=['\N{RIGHT SINGLE QUOTATION MARK}])"
 _LETTERS = {"v": "force", "f": "force", "p": "point", "c": "point", "m": "moment", "t": "torque"}
+_LETTERS |= {"a": "kistler"}  # Ax and Ay are points there, and accelerations elsewhere
+# As OpenSim names ahead, up and to the right; session_reading looks which way they really go.
+_NAMED = {
+    r"anter(?:ior|o)[\W_]*posterior|ap": "x",
+    r"medi(?:al|o)[\W_]*lateral|ml": "z",
+    "vertical|vert|v": "y",
+}
 # An axis comes with or without the letter of its quantity (vx, Fx, px, x).
 _KNOWN = "|".join(sorted(_WORDS, key=len, reverse=True))
-_AXIS = rf"(?:[vfpcmt]?[xyz](?=[lr]?(?![a-z]))|(?<![a-z])[xyz](?={_KNOWN}))"
+_BEGINS = "(?:(?<![a-z])|(?<=cop)|(?<=grf)|(?<=force)|(?<=moment)|(?<=torque))"
+_AXIS = rf"(?:[vfpcmta]?[xyz](?=[lr]?(?![a-z]))|(?<![a-z])[xyz](?={_KNOWN})"
+_AXIS += rf"|{_BEGINS}[fpcmt]?(?:{'|'.join(_NAMED)})(?:(?![a-z])|(?={_KNOWN})))"
 _TOKEN = re.compile(
     rf"(?P<word>{_KNOWN}|fp(?![a-z])|(?<![a-z])(?:{'|'.join(_SHORT)})(?=[xyz]?(?![a-z])))"
     rf"|(?<![a-z])(?:{_LINKS})(?![a-z])|(?P<number>\d+)|(?P<axis>{_AXIS})"
@@ -214,7 +237,7 @@ class Meaning(NamedTuple):
     """What one column holds."""
 
     plate: str  # "" where the name says none
-    quantity: str  # force, point, moment, torque
+    quantity: str  # force, point, moment, torque; kistler: a point, or an acceleration
     axis: str  # x, y, z
 
 
@@ -233,7 +256,7 @@ def meaning_of(name: str) -> Meaning | None:
     said = [_MEANINGS[token["word"]] for token in tokens if token["word"]]
     plate = [part for token in tokens if (part := token["number"] or token["other"])]
     plate += [word[0] for token in tokens if _MEANINGS.get(word := token["word"]) == "side"]
-    letter = axes[0][:-1]
+    letter, axis = _axis(axes[0])
     if letter == "v" and not {"force", "ground"} & set(said):
         return None  # a velocity
     quantities = [one for one in said if one in _LETTERS.values()]
@@ -243,7 +266,15 @@ def meaning_of(name: str) -> Meaning | None:
     if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):
         plate.remove(alone)  # F1_x
         quantity = _LETTERS[alone]
-    return Meaning("".join(plate), quantity, axes[0][-1]) if quantity else None
+    return Meaning("".join(plate), quantity, axis) if quantity else None
+
+
+def _axis(token: str) -> tuple[str, str]:
+    """The letter of a quantity, if there is one, and x, y or z."""
+    for names, axis in _NAMED.items():
+        if named := re.fullmatch(rf"([a-z]?)(?:{names})", token):
+            return named[1], axis
+    return token[:-1], token[-1]
 
 
 def _without_unit(name: str) -> tuple[str, str]:
@@ -268,7 +299,7 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
             found = f"columns '{table.names[first]}' and '{name}', which say the same of one plate"
             expected = "a column for each axis of each plate"
             raise refusal(path, found, expected, "rename one of them")
-    plates = {name: columns for name, columns in plates.items() if "force" in columns}
+    plates = _with_their_points(plates)
     if len(plates) > _MOST_FORCES:
         found = f"{len(plates)} ground forces"
         raise refusal(path, found, f"at most {_MOST_FORCES}", _AGAIN)
@@ -276,11 +307,15 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
         found = "no ground force among the columns " + ", ".join(table.names[:8])
         remedy = f"rename the columns or {_AGAIN}"
         raise refusal(path, found, "columns like ground_force_1_vx", remedy)
-    forces, used = [], {0}
+    forces, used, about = [], {0}, []
     for k, (plate, of_plate) in enumerate(plates.items()):
         columns = _columns_of(plate or str(k + 1), of_plate, table, path)
         forces.append(_force(str(k + 1), columns, table, path))
         used.update(chain(*columns.values()))
+        if some := [quantity for quantity, own in columns.items() if _ZERO in own]:
+            found = f"no columns for a part of its {' and '.join(some)}"
+            action = "took the height of points, and torques about level axes, as zero"
+            about.append(Finding("columns", str(k + 1), found, "x, y and z", action, "info"))
     largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
     for force in forces:  # a missing point or moment of no force is zero
         idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
@@ -294,8 +329,22 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     more = f" and {len(unknown) - _NAMES_SHOWN} more" if len(unknown) > _NAMES_SHOWN else ""
     found = f"{len(unknown)} columns of the forces that are not understood: {told}{more}"
     expected = "force, point and moment of each plate, by axis"
-    about = Finding("columns", "", found, expected, "left them out", "info")
-    return tuple(forces), [about] if unknown else []
+    left_out = Finding("columns", "", found, expected, "left them out", "info")
+    return tuple(forces), [*about, *([left_out] if unknown else [])]
+
+
+def _with_their_points(
+    plates: dict[str, dict[str, dict[str, int]]],
+) -> dict[str, dict[str, dict[str, int]]]:
+    """Those that have a force: a single one with what belongs to no plate by its name."""
+    known = {name: columns for name, columns in plates.items() if "force" in columns}
+    if len(known) == 1:
+        known = {name: plates.get("", {}) | columns for name, columns in known.items()}
+    for columns in known.values():
+        aims = columns.pop("kistler", {})
+        if len(aims) == 2 and "point" not in columns:
+            columns["point"] = aims
+    return known
 
 
 def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) -> None:
@@ -312,12 +361,18 @@ def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) ->
 def _columns_of(
     plate: str, columns: dict[str, dict[str, int]], table: _Table, path: Path
 ) -> dict[str, list[int]]:
-    """Of force, point and moment, as far as a plate has them, the columns x, y and z.
+    """Of force, point and moment, as far as a plate has them, the columns x, y and z; `_ZERO` for
+    the height of a point, and level torques at it, where these are left out.
 
     Of moments and torques it is these beside a point: free ones.
     """
+    sizes = {axis: np.nansum(np.abs(table.values[:, k])) for axis, k in columns["force"].items()}
+    up = max(sizes, key=sizes.__getitem__)
     for quantity, axes in columns.items():
-        if len(axes) < 3:
+        known = set(axes)
+        is_flat = quantity == "point" and known | {up} == set("xyz")
+        is_free = quantity in ("moment", "torque") and known == {up} and "point" in columns
+        if len(known) < 3 and not (len(sizes) == 3 and (is_flat or is_free)):
             column = printable(table.names[next(iter(axes.values()))])
             found = (
                 f"only {' and '.join(sorted(axes))} of the {quantity} of plate "
@@ -328,14 +383,19 @@ def _columns_of(
                 "(the height of a point on the floor, a torque about a level axis)"
             )
             raise refusal(path, found, "columns for x, y and z", remedy)
-    known = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
-    moments = [known.pop(name) for name in ("torque", "moment") if name in known]
-    return known | ({"moment": moments[0 if "point" in known else -1]} if moments else {})
+    own = {
+        quantity: [axes.get(axis, _ZERO) for axis in "xyz"] for quantity, axes in columns.items()
+    }
+    moments = [own.pop(name) for name in ("torque", "moment") if name in own]
+    return own | ({"moment": moments[0 if "point" in own else -1]} if moments else {})
 
 
 def _force(name: str, columns: dict[str, list[int]], table: _Table, path: Path) -> GroundForce:
-    values = {quantity: table.values[:, own] for quantity, own in columns.items()}
-    units = {quantity: table.unit(own[0]) for quantity, own in columns.items()}
+    values = {
+        quantity: np.where(np.array(own) == _ZERO, 0.0, table.values[:, own])
+        for quantity, own in columns.items()
+    }
+    units = {quantity: table.unit(max(own)) for quantity, own in columns.items()}
     size = force_in_N(units["force"]) if units["force"] else 1.0
     if size is None:
         found, remedy = f"forces in '{printable(units['force'][:20])}'", "export the forces in N"

@@ -25,6 +25,8 @@ Moved = Literal["", "all", "markers", "forces"]
 # hundred for a reference point or a turned plate, one in five hundred for corners the other way
 # round (none of 157 plates of 20 laboratories).
 _SCALED, _OTHER_POINT, TURNED, MIRRORED = -3.4, -4.6, -4.6, -6.2
+# Of moments: units as N cm, N dm or kgf m, seldom seen, beside N m and N mm.
+RARE_SCALES, _RARELY_SCALED = (1e-2, 1e-1, 1e1, 1e2), -4.6
 # Without the forces, or these without the moments, or one channel; two that are exchanged.
 _MOMENTS_REVERSED = -6.2
 _BOTH_REVERSED = -float(np.log(2))  # rather than one of them
@@ -75,7 +77,9 @@ class PlateReading:
         sensors = any(name in CHANNELS_OF[3] for name in self.channels.split())
         of_channels = _MOMENTS_REVERSED + _BOTH_REVERSED * both + _TWO_OF_SENSORS * sensors
         each = {
-            ("moments", abs(self.moment_scale)): _SCALED * (abs(self.moment_scale) != 1.0),
+            ("moments", scale := abs(self.moment_scale)): (
+                _RARELY_SCALED if scale in RARE_SCALES else _SCALED * (scale != 1.0)
+            ),
             ("points", self.point_scale): _SCALED * (self.point_scale != 1.0),
             ("signs", self.moment_scale < 0): _MOMENTS_REVERSED * (self.moment_scale < 0),
             ("channels", self.channels): of_channels * bool(self.channels),
@@ -145,7 +149,7 @@ def faults_of_channels(alike: Sequence[Sequence[str]]) -> list[str]:
 _MOMENT_SCALES = {
     1e-3: "read the moments in N mm",
     1e3: "read the moments in N m, a thousand times what their unit says",
-}
+} | {scale: f"read the moments as {scale:g} times what their unit says" for scale in RARE_SCALES}
 _POINT_SCALES = {
     1e-3: "read the points of force in mm",
     1e-2: "read the points of force in cm",

@@ -147,4 +147,10 @@ def corners_are_plausible(corners_m: np.ndarray) -> bool:
     if sides.min() < 0.1 or sides.max() > 5.0:
         return False
     diagonals = np.linalg.norm(corners_m[2:] - corners_m[:2], axis=1)
-    return bool(abs(diagonals[0] - diagonals[1]) < 0.1 * diagonals.max())
+    apart = [abs(diagonals[0] - diagonals[1]), parallelogram_gap(corners_m)]
+    return bool(max(apart) < 0.1 * diagonals.max())
+
+
+def parallelogram_gap(corners_m: np.ndarray) -> float:
+    """How far the middles of the diagonals of corners (4, 3) are apart, twice."""
+    return float(np.linalg.norm(corners_m[::2].sum(axis=0) - corners_m[1::2].sum(axis=0)))

@@ -13,6 +13,7 @@ from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.plate_reading import (
     ALIKE,
     AS_STATED,
+    RARE_SCALES,
     PlateReading,
     PlateSource,
     Reference,
@@ -147,6 +148,8 @@ class C3dPlate:
             abouts += ("reversed", "centred")
         for scale, about, turn, mirrored in product(scales, abouts, range(4), (False, True)):
             yield PlateReading(moment_scale=scale, about=about, turn=turn, mirrored=mirrored)
+        for scale in RARE_SCALES if kind in (2, 4) else ():
+            yield PlateReading(moment_scale=scale)
         for fault in faults_of_channels(ALIKE[kind]):
             yield PlateReading(channels=fault)
         for point, scale in product((10.0, 1e3), (1.0, 1e3)) if kind == 1 else ():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +114,7 @@ def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, 
         if loaded.any():
             mean = np.abs(force[loaded]).mean(axis=0)
             of_forces = scene.Up(int(np.argmax(mean)), 1, "the forces point there")
-            if by_labels and {by_labels.axis, of_forces.axis} == {1, 2}:
+            if by_labels and by_labels.axis != of_forces.axis:
                 by_segment = scene.by_segment(
                     trc.labels, positions_m @ scene.rotation_to_z_up(by_labels).T
                 )
@@ -127,16 +128,20 @@ def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, 
 
 def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     """Whether points of force (n, 3), in m or, where no laboratory is so large, in cm or mm, lie
-    where markers of the feet (n_frames, k, 3) are seen, in axes turned by some right angle about
-    the vertical."""
-    seen = np.concatenate([np.zeros((0, 3)), *(foot.reshape(-1, 3) for foot in feet_m)])
+    where markers of the feet (n_frames, k, 3) are seen, or between both, in axes turned by some
+    right angle about the vertical, or mirrored."""
+    if not feet_m:
+        return False
+    between = np.mean([foot.mean(axis=1) for foot in feet_m], axis=0)
+    seen = np.concatenate([between, *(foot.reshape(-1, 3) for foot in feet_m)])
     seen = seen[np.isfinite(seen).all(axis=1)]
     points = points_m[np.isfinite(points_m).all(axis=1), :2] @ np.array([1.0, 1j])
     if not len(points) or not len(seen):
         return False
     near = cKDTree(seen[:, :2])
     sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
-    turned = (points * size * 1j**quarter for size in sizes for quarter in range(4))
+    ways = product((points, points.conj()), sizes, range(4))
+    turned = (places * size * 1j**quarter for places, size, quarter in ways)
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
     return any(np.median(distance) < BESIDE_M for distance in distances)
 
@@ -213,6 +218,8 @@ def _source(
         f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
     )
     none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
+    if samples_s[-1] - grid.samples_s[-1] > 1 / markers.rate_hz:
+        expected += "; forces after rows that were lost in between come too early"
     findings += [
         replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
         for one in sample_findings(force.name, samples, grid.rate_hz)

@@ -307,7 +307,7 @@ class TrialSamples:
         samples = np.unique(np.concatenate(few)) if few else np.zeros(0, int)
         frames = np.round(samples * recording.marker_rate_hz / rate_hz).astype(int)
         samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
-        floor = sources[0].floor_m() if sources else 0.0
+        floors = [source.floor_m() for source in sources] or [0.0]
         return cls(
             name=recording.path.stem,
             hands=handedness(recording.labels, markers),
@@ -317,7 +317,7 @@ class TrialSamples:
             sources={s.name: s.at(samples) for s in sources},
             smooth={s.name: s.smoothed(SMOOTH_S * rate_hz).at(samples) for s in sources},
             loaded={s.name: heavy[s.name][samples] for s in sources},
-            feet=Feet.of(recording.labels, markers, frames, floor),
+            feet=Feet.of(recording.labels, markers, frames, floors),
             body=Body.of(segments if sources else {}, recording.marker_rate_hz, frames),
         )
 

@@ -66,20 +66,30 @@ class Feet:
 
     @classmethod
     def of(
-        cls, labels: Sequence[str], markers_m: np.ndarray, frames: np.ndarray, floor_m: float
+        cls,
+        labels: Sequence[str],
+        markers_m: np.ndarray,
+        frames: np.ndarray,
+        floors_m: Sequence[float],
     ) -> Feet:
         """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,); the
-        surface is where the plates have it, unless feet can never stand there."""
+        surfaces, of a step too, are where the plates have them, unless feet can never stand
+        there."""
         known = meanings(labels)
         sides = [known[n].segment[-1] if n in known else "" for n in labels]
         is_foot = np.array([n in known and known[n].is_of_foot for n in labels], bool)
         standing = lowest(markers_m[..., 2])
         sole = standing[is_foot].min(initial=np.inf)
-        if np.isfinite(sole) and not is_on_surface(sole - floor_m):
-            floor_m = sole
-        feet = np.flatnonzero(standing < floor_m + LOWEST_M[1])
+        floors = np.unique(floors_m)
+        if np.isfinite(sole) and not any(is_on_surface(sole - floor) for floor in floors):
+            floors = np.array([sole])
+        above = standing[:, None] - floors
+        on_some = is_foot & ((above > LOWEST_M[0]) & (above < LOWEST_M[1])).any(axis=1)
+        feet = np.flatnonzero((above[:, 0] < LOWEST_M[1]) | on_some)
+        own = np.where(above > LOWEST_M[0], floors, floors[0]).max(axis=1)[feet]
         points = markers_m[np.ix_(frames, feet)]
-        points[points[..., 2] - standing[feet] > _LIFT_M] = np.nan
+        lift = (points[..., 2] - standing[feet] + own)[..., None] - floors
+        points[(lift[..., 0] > _LIFT_M) & (np.abs(lift) > _LIFT_M).all(axis=-1)] = np.nan
         return cls(
             points,
             tuple(sides[k] if sides[k] in "lr" else "" for k in feet.tolist()),
@@ -116,10 +126,15 @@ class Feet:
         return replace(self, points_m=self.points_m @ change.T)
 
     def lowest_m(self) -> np.ndarray:
-        """Height of the lowest marker whose label says that it is on a foot, (n,); NaN without."""
-        heights = self.points_m[:, np.array(self.is_foot, bool), 2]
-        lowest_m = np.min(np.where(np.isfinite(heights), heights, np.inf), axis=1, initial=np.inf)
-        return np.where(np.isfinite(lowest_m), lowest_m, np.nan)
+        """Height of each foot's lowest marker whose label says that it is on one, (k, n); NaN
+        without."""
+        heights = np.where(self.is_foot, self.points_m[..., 2], np.nan)
+        heights = np.where(np.isfinite(heights), heights, np.inf)
+        feet = (
+            heights[:, [side == one for side in self.sides]] for one in dict.fromkeys(self.sides)
+        )
+        low_m = np.array([foot.min(axis=1) for foot in feet]).reshape(-1, len(heights))
+        return np.where(np.isfinite(low_m), low_m, np.nan)
 
     def distance_m(self, places_m: np.ndarray, apart: np.ndarray) -> np.ndarray:
         """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;
@@ -201,9 +216,10 @@ def evidence(
     table[0] = _mean(feet.at(known).distance_m(cop, apart[known]))
     if corners_m is not None:
         table[1] = _mean(np.linalg.norm(_beyond(cop, corners_m), axis=-1))
-    above = feet.at(known).lowest_m() - floor_m[:, None]
-    if np.isfinite(above).any():
-        table[2] = np.nanmedian(above, axis=1)
+    above = feet.at(known).lowest_m()[:, None] - floor_m[:, None]
+    if np.isfinite(above).any():  # of the foot that is nearer to the surface: one may be on a step
+        nearer = np.where(np.isfinite(above), np.abs(above), np.inf).argmin(axis=0)
+        table[2] = np.nanmedian(np.take_along_axis(above, nearer[None], 0)[0], axis=1)
     table[3] = _spread(cop)
     if passes[known].any():
         table[4] = _spread(cop[:, passes[known]])

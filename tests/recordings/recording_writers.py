@@ -13,6 +13,7 @@ CORNERS_M = np.array([[0.4, 0.6, 0.0], [0.0, 0.6, 0.0], [0.0, 0.0, 0.0], [0.4, 0
 CORNERS_M = CORNERS_M[[1, 0, 3, 2]]  # wound so that the plate's z points into the floor
 ORIGIN_M = np.array([0.001, -0.002, -0.04])
 Y_UP_FROM_Z_UP = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+X_UP_FROM_Z_UP = np.array([[0.0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
 
 
 @dataclass

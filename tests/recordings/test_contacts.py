@@ -95,6 +95,18 @@ def test_a_foot_that_steps_onto_the_plate_is_measured_at_once():
     assert result.valid[70:].all()
 
 
+def test_a_foot_on_a_step_touches_it():
+    """From one plate onto another, 0.3 m high, whose load it then bears."""
+    x = np.interp(np.arange(N), [0, 100, 140, N], [0.4, 0.4, 0.75, 0.75])
+    lift = np.interp(np.arange(N), [0, 100, 120, 135, 140, N], [0.0, 0.0, 0.4, 0.35, 0.3, 0.3])
+    share = np.interp(np.arange(N), [0, 140, 150, N], [0.0, 0.0, 0.8, 0.8])
+    step = replace(_plate(share * WEIGHT_N, CORNERS + np.array([0.5, 0.0, 0.3]), x=0.75), name="2")
+    result = _windows(_foot(0.1), _foot(x, lift), [_plate((1.0 - share) * WEIGHT_N), step])
+    assert result.valid.all()
+    assert result.on_plate["r"][:95].all() and result.on_plate["r"][150:].all()
+    assert not result.on_ground["r"][105:135].any()
+
+
 def test_outline_has_a_tolerance():
     assert _windows(_foot(0.1), _foot(0.52), [_plate(WEIGHT_N)]).valid.all()
     assert not _windows(_foot(0.1), _foot(0.54), [_plate(WEIGHT_N)]).valid.any()

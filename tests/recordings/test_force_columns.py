@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -148,6 +149,29 @@ def test_each_naming_gives_every_column_its_place(tmp_path, dialect):
 
 
 @pytest.mark.parametrize(
+    ("names", "plate"),
+    [
+        ("F_ap_1 F_v_1 F_ml_1 COP_ap_1 M_v_1", "1"),
+        ("L_AP_force L_V_force L_ML_force L_AP_cop L_V_moment", "l"),
+        ("FP2_Fap FP2_Fv FP2_Fml FP2_COPap FP2_Mv", "2"),
+        ("FAP FV FML COPap TV", ""),
+        ("GRF_ap_R GRF_vert_R GRF_ml_R cop_ap_R torque_vertical_R", "r"),
+        (
+            "Plate_1_Anterior-Posterior_Force Vertical_Force_1 1_Medio-lateral_Force "
+            "Plate_1_Anteroposterior_CoP Vertical_Moment_1",
+            "1",
+        ),
+    ],
+)
+def test_ahead_aside_and_up(names, plate):
+    found = [meaning_of(name) for name in names.split()]
+    assert [one.plate for one in found] == [plate] * 5
+    assert [one.axis for one in found] == list("xyzxy")
+    assert [one.quantity[:5] for one in found[:4]] == ["force"] * 3 + ["point"]
+    assert found[4].quantity in ("moment", "torque")
+
+
+@pytest.mark.parametrize(
     "name",
     [
         "pelvis_tilt",
@@ -180,7 +204,7 @@ def test_columns_that_are_not_understood_are_named(tmp_path):
 @pytest.mark.parametrize(
     ("lost", "said"),
     [
-        ("ground_force_1_pz", "only x and y of the point of plate '1'"),
+        ("ground_force_1_px", "only y and z of the point of plate '1'"),
         ("ground_force_2_vx", "only y and z of the force of plate '2'"),
         ("ground_torque_2_y", "only x and z of the torque of plate '2'"),
     ],
@@ -220,6 +244,11 @@ EDITS = {
         part.replace("\t", "  ") if k else part for k, part in enumerate(text.split("Fz2\n0"))
     ),
     "time in capitals": lambda text: text.replace("\ntime\t", "\nTIME\t"),
+    "time of a program": lambda text: text.replace("\ntime\t", "\nAbs Time (s)\t"),
+    "time in German": lambda text: text.replace("\ntime\t", "\nZeit [s]\t"),
+    "numbers of frames before the time": lambda text: re.sub(
+        r"(?m)^(?=0\.|0\t)", "7\t", text.replace("\ntime\t", "\nFrame#\tTime_s\t")
+    ),
     "carriage returns": lambda text: text.replace("\n", "\r\n"),
 }
 
@@ -311,6 +340,28 @@ def test_a_force_that_is_nothing_but_rounding_needs_no_point(tmp_path):
 
     plate = _standing(tmp_path, unload=slice(0, 20), edit=with_rounding).plates[0]
     assert plate.usable.all()
+
+
+@pytest.mark.parametrize("names", ["F{} A{} T{}", "F{} COP{} T{}", "F{}1 COP{} M{}"])
+def test_what_is_zero_by_definition_may_be_left_out(tmp_path, names):
+    """The height of points on the floor, and level torques there; of one plate also its number."""
+    force, point, torque = names.split()
+
+    def flat(columns):
+        named = {"F": force, "C": point, "T": torque}
+        kept = [name for name in columns if name not in ("COPy1", "Tx1", "Tz1")]
+        return {named[name[0]].format(name[-2]): columns[name] for name in kept}
+
+    whole, read = _standing(tmp_path), _standing(tmp_path, edit=flat)
+    np.testing.assert_allclose(read.plates[0].wrench(), whole.plates[0].wrench(), atol=1e-9)
+    (said,) = (f for f in read.findings if f.check == "columns")
+    assert (said.level, said.found) == ("info", "no columns for a part of its point and moment")
+
+
+def test_three_columns_of_one_letter_are_accelerations(tmp_path):
+    more = {f"A{axis}1": np.ones(N) for axis in "xyz"}
+    recording = _standing(tmp_path, keep="vt", edit=lambda columns: columns | more)
+    assert "no columns for its point" in [f.found for f in recording.findings]
 
 
 def test_a_missing_point_under_load_stays_lost(tmp_path):

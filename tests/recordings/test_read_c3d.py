@@ -11,11 +11,12 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plates import CHANNELS_OF, PlateDescription
+from bsip_cli.recordings.plates import CHANNELS_OF, PlateDescription, corners_are_plausible
 from bsip_cli.recordings.read import open_recording, read_recording
 from tests.recordings.recording_writers import (
     CORNERS_M,
     ORIGIN_M,
+    X_UP_FROM_Z_UP,
     Y_UP_FROM_Z_UP,
     PlateSpec,
     standing_markers,
@@ -158,11 +159,14 @@ def test_a_rate_that_two_others_contradict(tmp_path):
         (3, lambda table: table - 1, "counted from 0"),
         (1, lambda table: table.ravel().reshape(table.shape, order="F"), "by rows"),
         (4, lambda table: table.T - 1, "a row for each plate and counted from 0"),
+        (2, lambda table: table.T, "a row for each plate"),
+        (3, lambda table: table + 7, "counted from 8"),
+        (2, lambda table: table.ravel(order="F"), "as one list"),
     ],
 )
 @pytest.mark.parametrize("label", ["{axis}{plate}", "Force.{axis}{plate}"])
 def test_channels_that_are_listed_otherwise(tmp_path, kind, table, words, label):
-    """The labels of the channels tell how; without them the plates are left out, and it is said."""
+    """The labels of the channels tell how; without them it is told by which channels there are."""
     path, spec = tmp_path / "a.c3d", _spec(kind=kind, origin_m=_origin(kind))
     aside = replace(spec, corners_m=spec.corners_m + np.array([1.0, 0.0, 0.0]))
     content = ezc3d.c3d(str(write_c3d(path, *standing_markers(N), [spec, aside])))
@@ -177,10 +181,27 @@ def test_channels_that_are_listed_otherwise(tmp_path, kind, table, words, label)
     content.write(str(path))
     read = read_recording(path)
     assert [words in f.found for f in read.findings if f.check == "plate"] == [True]
-    for one, other in zip(read.plates, sound.plates, strict=True):
-        np.testing.assert_allclose(one.moment_Nm, other.moment_Nm, atol=1e-3)
-    if "0" in words:
-        assert any("CHANNEL" in f.found for f in unknown.findings if f.check == "plate")
+    for some in (read, unknown) if words != "by rows" else (read,):
+        for one, other in zip(some.plates, sound.plates, strict=True):
+            np.testing.assert_allclose(one.moment_Nm, other.moment_Nm, atol=1e-3)
+        assert any(words in f.found for f in some.findings if f.check == "plate")
+
+
+def test_corners_with_a_row_for_each(tmp_path):
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = ezc3d.c3d(str(path))
+    corners = content["parameters"]["FORCE_PLATFORM"]["CORNERS"]
+    corners["value"] = corners["value"].swapaxes(0, 1)
+    content.write(str(path))
+    recording = read_recording(path)
+    assert _levels(recording, "plate") == ["corrected"]
+    _check_wrench(recording)
+
+
+def test_corners_of_equal_diagonals_may_still_be_no_plate():
+    away = np.array([1.0, 0.0, 0.0])
+    crossed = CORNERS_M + np.array([away, 0 * away, away, 0 * away])
+    assert not corners_are_plausible(crossed)
 
 
 def test_more_plates_are_described_than_used(tmp_path):
@@ -281,20 +302,35 @@ def test_y_up_laboratory_is_turned(tmp_path):
     _check_wrench(recording)
 
 
+@pytest.mark.parametrize("turn", [Y_UP_FROM_Z_UP.T, X_UP_FROM_Z_UP.T])
 @pytest.mark.parametrize("whose", ["markers", "plates"])
-def test_plates_in_other_axes_than_the_markers_are_turned_by_themselves(tmp_path, whose):
+def test_plates_in_other_axes_than_the_markers_are_turned_by_themselves(tmp_path, whose, turn):
+    aside_m = np.array([0.8, 0.0, 0.0])  # where heights are those of no one who lies there
     markers, labels = standing_markers(N)
     force, moment = standing_wrench(N * RATIO)
-    turn = Y_UP_FROM_Z_UP.T
-    spec = PlateSpec(force, moment, corners_m=CORNERS_M)
-    if whose == "markers":
-        markers = markers @ turn
-    else:
-        spec = PlateSpec(force @ turn, moment @ turn, corners_m=CORNERS_M @ turn)
+    moment, expected = moment + np.cross(aside_m, force), markers + aside_m
+    matrices = (turn, np.eye(3)) if whose == "markers" else (np.eye(3), turn)
+    markers, corners = expected @ matrices[0], (CORNERS_M + aside_m) @ matrices[1]
+    spec = PlateSpec(force @ matrices[1], moment @ matrices[1], corners_m=corners)
     recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, labels, [spec]))
     (about,) = [finding for finding in recording.findings if finding.check == "up_axis"]
     assert about.expected == "one laboratory frame"
-    np.testing.assert_allclose(recording.markers_m, standing_markers(N)[0], atol=1e-6)
+    np.testing.assert_allclose(recording.markers_m, expected, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-3)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-3)
+
+
+@pytest.mark.parametrize("up", [0, 1])
+def test_channels_in_axes_of_which_another_one_is_up(tmp_path, up):
+    """Corners as the format wants them, and Fx or Fy across the plate."""
+    path = _write(tmp_path / "a.c3d", _spec())
+    content = ezc3d.c3d(str(path))
+    six = content["data"]["analogs"][:, :6]
+    content["data"]["analogs"][:, :6] = np.roll(six.reshape(2, 3, -1), up + 1, 1).reshape(1, 6, -1)
+    content.write(str(path))
+    recording = read_recording(path)
+    (said,) = (f.found for f in recording.findings if f.check == "plate")
+    assert said.startswith(f"{('Fx', 'Fy')[up]} of the plates bears the load")
     _check_wrench(recording)
 
 

@@ -10,6 +10,7 @@ import pytest
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import (
+    X_UP_FROM_Z_UP,
     Y_UP_FROM_Z_UP,
     standing_markers,
     standing_wrench,
@@ -28,13 +29,12 @@ MARKERS, LABELS = standing_markers(N)
 FORCE, MOMENT = standing_wrench(N)
 
 
-def _columns(force, moment, naming="numbered", point_scale=1.0, y_up=True):
+def _columns(force, moment, naming="numbered", point_scale=1.0, turn=TURN):
     """Force at the point of pressure with its free torque, written in the lab frame."""
     point = np.column_stack(
         [-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2], 0 * force[:, 2]]
     )
     free = moment - np.cross(point, force)
-    turn = TURN if y_up else np.eye(3)
     parts = (force @ turn, point @ turn * point_scale, free @ turn)
     return {
         name.format(axis): values[:, i]
@@ -179,25 +179,32 @@ def test_broken_mot_is_refused(tmp_path, text):
 
 
 @pytest.mark.parametrize("point_scale", [1.0, 1000.0])
-@pytest.mark.parametrize("forces_y_up", [True, False])
-@pytest.mark.parametrize("markers_y_up", [True, False])
-def test_markers_and_forces_are_turned_each_in_its_own_way(
-    tmp_path, markers_y_up, forces_y_up, point_scale
-):
+@pytest.mark.parametrize("forces", [TURN, X_UP_FROM_Z_UP.T, np.eye(3)])
+@pytest.mark.parametrize("markers", [TURN, X_UP_FROM_Z_UP.T, np.eye(3)])
+def test_markers_and_forces_are_turned_each_in_its_own_way(tmp_path, markers, forces, point_scale):
     """A conversion may turn a TRC and leave its MOT, or the other way round."""
-    columns = _columns(FORCE, MOMENT, "numbered", point_scale, forces_y_up)
-    recording = _read(tmp_path, columns, MARKERS @ TURN if markers_y_up else MARKERS)
-    expected = {"up_axis": "corrected"} if markers_y_up or forces_y_up else {}
+    columns = _columns(FORCE, MOMENT, "numbered", point_scale, forces)
+    recording = _read(tmp_path, columns, MARKERS @ markers)
+    are_z_up = (markers == np.eye(3)).all() and (forces == np.eye(3)).all()
+    expected = {} if are_z_up else {"up_axis": "corrected"}
     actions = {f.check: f.action for f in recording.findings}
     if point_scale != 1.0:
         expected |= {"plate_cop": "corrected"}
         assert "points of force in mm" in actions["plate_cop"]
     assert _levels(recording) == expected
-    if not markers_y_up:
-        np.testing.assert_array_equal(recording.rotation_world_lab, np.eye(3))
+    np.testing.assert_allclose(markers @ recording.rotation_world_lab.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(recording.markers_m, MARKERS, atol=1e-6)
     np.testing.assert_allclose(recording.plates[0].force_N, FORCE, atol=1e-6)
     np.testing.assert_allclose(recording.plates[0].moment_Nm, MOMENT, atol=1e-5)
+
+
+@pytest.mark.parametrize("lost", [0, 6])
+def test_forces_that_end_before_the_markers_may_have_lost_rows(tmp_path, lost):
+    columns = {
+        name: np.delete(x, slice(20, 20 + lost)) for name, x in _columns(FORCE, MOMENT).items()
+    }
+    said = [f.expected for f in _read(tmp_path, columns).findings if f.check == "analog_nan"]
+    assert ["come too early" in one for one in said] == [True] * (lost > 0)
 
 
 def test_who_lies_on_the_plates_keeps_the_forces_axes(tmp_path):

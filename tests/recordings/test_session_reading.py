@@ -108,6 +108,7 @@ FAULTS = {
     "turned by 270 degrees": (of_c3d, {"turn": 3}, "270 degrees"),
     "N m taken for N mm": (of_c3d, {"moment_scale": 1e-3}, "N m, a thousand times"),
     "N mm taken for N m": (of_c3d, {"moment_scale": 1e3}, "N mm"),
+    "N cm taken for N mm": (of_c3d, {"moment_scale": 1e-1}, "10 times what their unit"),
     "ORIGIN is a place in the lab": (
         of_c3d,
         {"origin_m": (0.0, 0.0, -0.04), "stated_origin_m": PLACE_OF_LAB},
@@ -283,6 +284,25 @@ def test_forces_that_no_reading_brings_under_the_feet_are_refused():
         session = session_reading([TrialSamples.of(trial)])
         assert [f.level for f in findings_about(session)] == ["excluded"] * 2
         assert assemble(trial, session).plates == ()
+
+
+@pytest.mark.parametrize("make", [of_c3d, of_table])
+def test_a_foot_on_a_step_is_on_its_plate(make):
+    """The right foot on a plate of 0.3 m, the left one on the floor."""
+    up = np.array([0.0, 0.0, 0.3])
+    markers, right, left = motion()[0], *make()
+    markers[:, [name.startswith("R") and name[1:] in ("HEE", "TOE", "ANK") for name in LABELS]] += (
+        up
+    )
+    if isinstance(right, C3dPlate):
+        stated = replace(right.description, corners_m=right.description.corners_m + up)
+        right = replace(right, description=stated)
+    else:
+        right = replace(right, points=right.points + up, point_height=0.3)
+    trial = opened([right, left], markers)
+    session = session_reading([TrialSamples.of(trial)])
+    assert all(one.reading.repairs() == {} for one in session.plates.values())
+    assert [plate.name for plate in assemble(trial, session).plates] == ["1", "2"]
 
 
 @pytest.mark.parametrize("rise_m", [-1.6, -0.3, 0.2, 1.1])

@@ -127,6 +127,8 @@ def _compared(other: str, one: choice.Difference) -> str:
         change = 100 * (one.ratio - 1)
         how = f"{number(abs(change), 0)} % {'less' if change < 0 else 'more'} than {other}"
         return f"{how} (too few independent samples for an interval)"
+    if max(map(abs, ends)) < 0.5:
+        return f"as much as {other}"
     if ends[0] < 0 < ends[1]:
         low, high = (number(abs(end), 0) for end in ends)
         return f"between {low} % less and {high} % more than {other}"

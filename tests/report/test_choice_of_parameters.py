@@ -116,6 +116,7 @@ def test_the_sentence_says_newtons_and_what_decides():
         (np.log(0.8), 0.05, "16 to 24 % less than RM"),
         (np.log(1.2), 0.05, "14 to 26 % more than RM"),
         (0.0, 0.05, "between 5 % less and 5 % more than RM"),
+        (0.001, 0.003, "as much as RM"),
         (np.log(0.8), np.nan, "20 % less than RM (too few independent samples for an interval)"),
     ],
 )

@@ -112,7 +112,7 @@ def _frames(skeleton: Skeleton, centres: JointCentres, landmarks: Places) -> dic
     pairs = [
         landmarks[f"{name}_r"] - landmarks[f"{name}_l"]
         for name in ("temple", "forehead", "occiput")
-        if f"{name}_r" in landmarks
+        if {f"{name}_r", f"{name}_l"} <= landmarks.keys()
     ]
     vertical = np.array([0.0, 0.0, 1.0])
     up = landmarks["vertex"] - p["neck"] if "vertex" in landmarks else vertical

@@ -9,6 +9,7 @@ from bsip_cli.body.anthropometry import mean_length_m
 from bsip_cli.body.joint_centres import JointCentres, joint_centres, missing_landmarks, with_skin
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from tests.body.standing_person import HEIGHT_M, standing_markers
@@ -37,6 +38,16 @@ def centres(*gone: str) -> JointCentres:
 def held(calibration: Calibration) -> set[str]:
     person = calibration.person
     return {s for s, h in zip(person.skeleton.segments, person.held, strict=True) if h}
+
+
+@pytest.mark.parametrize("label", sorted(standing_markers()))
+def test_any_marker_may_be_missing_and_a_person_comes_of_it_or_words(label):
+    try:
+        person = calibrated(label).person
+    except BadDataError as refused:
+        assert label in str(refused) or "marker" in str(refused)
+    else:
+        assert np.isfinite(person.lengths_m).all()
 
 
 @pytest.mark.parametrize("gone", [("C7", "IJ"), ("RAC", "LAC"), ("C7",), ("LAC",)])

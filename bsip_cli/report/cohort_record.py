@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.effects.effect import Number, digits_of, readable_unit, with_unit
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.causes import Candidate, Cause, candidates_of, causes_of
-from bsip_cli.report.errors import COP, FORCE, MARKERS
+from bsip_cli.report.errors import MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.words import COMPONENTS, TEXTS, listing, number, say, task_of
 from bsip_cli.statistics.methods import ALTERNATIVES, METHODS, OM, RM
@@ -75,24 +75,10 @@ def _mean_errors(read: ReadValues, component: str, held_out: bool) -> pd.DataFra
     return means[(means[[OM, RM]] > 0.0).all(axis="columns")]
 
 
-def yardsticks_of(read: ReadValues, use: Mapping[str, str]) -> dict[str, dict[str, float]]:
-    """By participant, the errors of the method that each is to use: the root mean square over the
-    trials with held-out data, or over all where there are none."""
-    found: dict[str, dict[str, float]] = {}
-    for name, variable in ((COP, "cop_error"), (FORCE, "grf_vertical")):
-        rows = read("table4", variable).dropna(subset="value")
-        rows = rows[rows["method"] == rows["participant"].map(use)]
-        for participant, own in rows.groupby("participant"):
-            unseen = own[own["data"] == "held_out"]
-            chosen = (unseen if len(unseen) else own)["value"]
-            found.setdefault(str(participant), {})[name] = float(np.sqrt((chosen**2).mean()))
-    return found
-
-
 @dataclass(frozen=True)
 class Member:
     """One participant of the study; what is shown of person and identification, which parameters
-    to use, the errors with them, what a diagnosis found, and the light of the report, if there."""
+    to use, the errors with them as on the person's page, what a diagnosis found, and the light of the report, if there."""
 
     id: str
     facts: Mapping[str, Any] | None

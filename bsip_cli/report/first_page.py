@@ -226,11 +226,11 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
     makes the errors of the table's."""
     used = record.use_words()
-    first, other = recordings.measured_of(record), recordings.measured_of(record, RM)
+    first, other = recordings.shown_of(record), recordings.measured_of(record, RM)
     later = " (not yet)" if recordings.must_wait(record) else ""
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if recordings.om_waits(record):
-        first, other = other, first
+        other = recordings.measured_of(record)
         which = f"? ● {RM}, ○ {used}{later}"
     scales = [
         (one, size, None if one.shown(other[one]) == one.shown(size) else other[one])

@@ -67,6 +67,11 @@ def measured_of(record: ParticipantRecord, method: str = "") -> dict[Yardstick, 
     return _sizes(record, record.moving_trials(), markers_mm, method)
 
 
+def shown_of(record: ParticipantRecord) -> dict[Yardstick, float]:
+    """The same by the table's parameters as long as OM has to wait: what counts for this person."""
+    return measured_of(record, RM if om_waits(record) else "")
+
+
 @_once
 def _of_each(record: ParticipantRecord) -> dict[str, dict[Yardstick, float]]:
     """The yardsticks with the numbers of each recording, by its stem."""

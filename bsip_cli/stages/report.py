@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
@@ -15,7 +16,7 @@ from bsip_cli.report import cohort_record as cohort
 from bsip_cli.report import records
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.participant import participant_document
-from bsip_cli.report.recordings import large_finding, light_for, must_wait, use_now
+from bsip_cli.report.recordings import large_finding, light_for, must_wait, shown_of, use_now
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
@@ -40,7 +41,8 @@ def run(unit: Unit) -> None:
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
     facts: dict[str, Any] = {"light": asdict(light), "large": large_finding(record)}
-    facts |= {"first": must_wait(record), "use": use_now(record)}
+    shown = {one.name: size for one, size in shown_of(record).items() if np.isfinite(size)}
+    facts |= {"first": must_wait(record), "use": use_now(record), "errors": shown}
     unit.write("report-files", rows, facts=facts)
 
 
@@ -156,13 +158,8 @@ def cohort_record_of(unit: Unit) -> cohort.CohortRecord:
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
 
-    use = {one.id: _use(unit, one) for one in unit.study.participants}
-    errors = cohort.yardsticks_of(read, use)
     return cohort.CohortRecord(
-        members=tuple(
-            _member(unit, person, use[person.id], errors.get(person.id, {}))
-            for person in unit.study.participants
-        ),
+        members=tuple(_member(unit, person) for person in unit.study.participants),
         ratios=cohort.ratios_of(read),
         tables=build_tables(compared, criteria, facts["fitted_on"], facts["missing"]),
         table_files=tuple(unit.read("tables-files")["file"]),
@@ -195,9 +192,7 @@ def _use(unit: Unit, participant: Participant) -> str:
     return str(_facts(unit, "report-files", participant).get("use", chosen))
 
 
-def _member(
-    unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]
-) -> cohort.Member:
+def _member(unit: Unit, participant: Participant) -> cohort.Member:
     identified = _read(unit, "identification", participant)
     if len(identified):
         identified = identified[identified["method"] == OM]
@@ -213,7 +208,8 @@ def _member(
     page, refusals = _facts(unit, "report-files", participant), refusals_of(unit, participant)
     light = Light(**page["light"]) if page else None
     known = participant.id, first["person"], first["identification"], bool(page), refusals, searched
-    return cohort.Member(*known, use if errors else "", errors, light)
+    errors = page.get("errors", {})
+    return cohort.Member(*known, _use(unit, participant) if errors else "", errors, light)
 
 
 def _origins_of_all(unit: Unit) -> Iterator[records.Origin]:

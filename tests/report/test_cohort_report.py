@@ -67,7 +67,7 @@ def test_person_of_whom_nothing_was_identified(reports, tmp_path):
     Artifacts(tmp_path, person).write("identification", empty_table("identification"))
     here.run("report")
     row = re.search(rf"{person.id}</td>.*?</tr>", here.html("group"), re.DOTALL)
-    assert row[0].count(MISSING) == 2
+    assert row[0].count(MISSING) == 5  # nor a page, which tells errors and use
 
 
 def test_empty_cohort_gives_sentences(reports):
@@ -95,11 +95,13 @@ def test_the_first_page_has_a_dot_per_person(reports, page):
     numbers = pd.read_csv(reports.out / "group" / "figures" / "yardsticks.csv")
     assert list(numbers["participant"]) == ["sub-01", "sub-02", "sub-03"]
     values = reports.unit("report").read("values", table=["table4"], variable=["grf_vertical"])
-    assert "use RM for 1 and OM for 1" in front  # as their own pages say: OM of sub-01 has to wait
+    assert "use RM for 1" in front  # as its own page says: OM of sub-01 has to wait
     own = values[(values["participant"] == "sub-01") & (values["method"] == "RM")]
     (held_out,) = own.loc[own["data"] == "held_out", "value"]
     assert numbers["vertical_force_percent_bw"][0] == pytest.approx(held_out, rel=1e-4)
-    assert np.isnan(numbers["cop_mm"][2])
+    told = reports.unit("report").facts("report-files", participant=reports.study.participants[0])
+    assert numbers["cop_mm"][0] == pytest.approx(told["errors"]["cop_mm"], rel=1e-4)
+    assert np.isnan(numbers["cop_mm"][1:]).all()  # they have no page
     assert "Who could not be used, and why" in front
 
 

@@ -10,14 +10,13 @@ by the simulator's own route, such as
     bsip simulate more --participants 64 --seed 90210 --run 2 --task walking --soft-tissue measured
     cp -r more/sub-* study; bsip run study --out POOL --until laboratory
 
-Persons are drawn from them with replacement, and one fault is added
-to what they tell: J theta to the pull; to what they tell in motion alone, where trials of who
-stands still are clean. In another kind persons only know as much as those of the pool, and what
-they tell is drawn as the model has it, deviations and all. Tables: ``drawn``, the errors beside the
-Cramer-Rao bound (the persons' deviations and every other number known to be as usual) and how often
-95 % intervals hold; ``nulls``, names that are false in laboratories without a fault; ``alike``, how
-far all persons of the pool err alike in each direction; ``cost``, time and memory of the files of
-many persons.
+Persons are drawn from them with replacement, and one fault is added to what they tell: J theta to
+the pull; to what they tell in motion alone, where trials of who stands still are clean. In another
+kind persons only know as much as those of the pool, and what they tell is drawn as the model has
+it, deviations and all. Tables: ``drawn``, the errors beside the Cramer-Rao bound (the persons'
+deviations and every other number known to be as usual) and how often 95 % intervals hold;
+``nulls``, names that are false in laboratories without a fault; ``alike``, how far all persons of
+the pool err alike in each direction; ``cost``, time and memory of the files of many persons.
 """
 
 from __future__ import annotations

@@ -217,9 +217,9 @@ def resampled(
     weights = rng.multinomial(everybody, np.full(everybody, 1 / everybody), size=count)
     precision = np.zeros((count, *persons.precision.shape[1:]))
     pull = np.zeros((count, persons.pull.shape[1]))
-    first, spread = 0, scale[persons.groups]
-    for j, h, usual in persons.blocks():
-        mine = weights[:, first : (first := first + len(h))]
+    spread = scale[persons.groups]
+    for first, (j, h, usual) in zip(range(0, everybody, _BLOCK), persons.blocks(), strict=True):
+        mine = weights[:, first : first + _BLOCK]
         each, pulls, _ = _shown(j, h, usual * spread, persons.both)
         precision += np.tensordot(mine, each, 1)
         pull += mine @ pulls

@@ -286,12 +286,13 @@ def _shares(lab: Laboratory, k: int, others: Sequence[Sums]) -> dict[int, float]
     model gets wrong, it takes for one of two similar faults as surely as if it were true (bagged
     posteriors: Huggins and Miller 2023, Bayesian Anal 18)."""
 
-    def shares(sums: Sums) -> np.ndarray:
-        return shares_of(np.array([log for log, _ in _log_odds(lab, k, sums).values()]))
+    def shares(odds: Mapping[int, tuple[float, float]]) -> np.ndarray:
+        return shares_of(np.array([log for log, _ in odds.values()]))
 
-    drawn = np.array([shares(one) for one in others])
+    by_all = _log_odds(lab, k)
+    drawn = np.array([shares(_log_odds(lab, k, one)) for one in others])
     which = (drawn / drawn.sum(axis=1, keepdims=True)).mean(axis=0)
-    return dict(zip(_log_odds(lab, k), shares(lab.sums).sum() * which, strict=True))
+    return dict(zip(by_all, shares(by_all).sum() * which, strict=True))
 
 
 def shares_of(logs: np.ndarray) -> np.ndarray:

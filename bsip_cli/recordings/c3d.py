@@ -19,6 +19,11 @@ from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.plate_reading import Opened
 
+# Turns about the vertical by right angles, which two ways to turn a frame Z-up may differ by.
+_QUARTERS = [
+    np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))
+]
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
     r"^(centreofmass.*|centerofmass.*|.*(angles?|forces?|moments?|power))$", re.IGNORECASE
@@ -88,7 +93,7 @@ def _ups(
         def stand(up: scene.Up, up_of_plates: scene.Up) -> bool:
             turn, of_plates = map(scene.rotation_to_z_up, (up, up_of_plates))
             level = [corners @ of_plates.T for corners in surfaces]
-            quarters = scene.QUARTERS if up != up_of_plates else [np.eye(3)]
+            quarters = _QUARTERS if up != up_of_plates else [np.eye(3)]
             turned = ([corners @ quarter.T for corners in level] for quarter in quarters)
             return any(_stands_on(labels, positions_m @ turn.T, one) for one in turned)
 

@@ -179,7 +179,7 @@ def _description(
         raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
     if (kind := int(kinds[index])) not in CHANNELS_OF:
         raise _UnusablePlateError(f"force platform type {kind}", "types 1 to 4")
-    _numbers_of(group, "CORNERS", index, 12)
+    _numbers_of(group, "CORNERS", index, 12)  # refuses a plate without
     written = _all_corners(group)[index]
     plate_unit_m, about = _plate_unit(written, length_unit_m, name)
     origin = _numbers_of(group, "ORIGIN", index, 3)

@@ -209,15 +209,14 @@ class _Foot:
         known = np.isfinite(markers_m).all(axis=-1)
         height_m = np.where(known, markers_m[..., 2], np.nan)
         height = np.nan_to_num(height_m - lowest(height_m), nan=np.inf)
-        low_m = np.where(known, markers_m[..., 2], np.inf).min(axis=1, initial=np.inf)
+        low_m = np.fmin.reduce(height_m, axis=1, initial=np.nan)
         frames, reach = np.arange(len(markers_m)), max(1, round(0.02 * rate_hz))
         after, before = np.minimum(frames + reach, frames[-1:]), np.maximum(frames - reach, 0)
         span = np.maximum(after - before, 1)[:, None, None]  # about 40 ms
         velocity = (markers_m[after] - markers_m[before]) / span * rate_hz
         speed = np.linalg.norm(velocity, axis=-1)[frames, height.argmin(axis=1)]
-        seen = known.any(axis=1)
-        low_m = np.where(seen, low_m, np.nan)
-        return cls(markers_m[..., :2], height, np.nan_to_num(speed, nan=0.0), seen, low_m)
+        speed = np.nan_to_num(speed, nan=0.0)
+        return cls(markers_m[..., :2], height, speed, known.any(axis=1), low_m)
 
     def goes_below(self, corners_m: np.ndarray) -> bool:
         """Whether a surface is a step to this foot, which also stands lower."""

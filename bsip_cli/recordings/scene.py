@@ -37,12 +37,6 @@ _SHOULDERS = ("c7", "acromion")
 _FLAT_M = 0.035  # of every marker of a foot over its own lowest
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "dm": 0.1, "ft": 0.3048, "m": 1.0}
 
-QUARTERS = [
-    np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))
-]
-"""Turns about the vertical by right angles, which two ways to turn a frame Z-up may differ by."""
-
 _LOW = ("foot_l", "foot_r", "malleolus_lateral_l", "malleolus_lateral_r")
 _HIGH = ("head", "upper_torso")
 _CLEARLY_ABOVE_M = 0.2

@@ -73,10 +73,8 @@ def _about_those_against(trials: tuple[str, ...]) -> list[Finding]:
         return []
     found = "as many trials contradict how the plates are understood as agree with it: in "
     found += f"{', '.join(trials)} no reading of them makes forces and motion one person's"
-    action = (
-        "kept the forces of the others, whose sizes and points of force may be wrong too; look "
-    )
-    action += "at the channels and corners of the plates"
+    action = "kept the forces of the others, whose sizes and points of force may be wrong too; "
+    action += "look at the channels and corners of the plates"
     return [Finding("plate_cop", "forces", found, "one reading of all trials", action, "warning")]
 
 

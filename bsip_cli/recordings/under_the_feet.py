@@ -129,12 +129,9 @@ class Feet:
         """Height of each foot's lowest marker whose label says that it is on one, (k, n); NaN
         without."""
         heights = np.where(self.is_foot, self.points_m[..., 2], np.nan)
-        heights = np.where(np.isfinite(heights), heights, np.inf)
-        feet = (
-            heights[:, [side == one for side in self.sides]] for one in dict.fromkeys(self.sides)
-        )
-        low_m = np.array([foot.min(axis=1) for foot in feet]).reshape(-1, len(heights))
-        return np.where(np.isfinite(low_m), low_m, np.nan)
+        feet = ([side == one for side in self.sides] for one in dict.fromkeys(self.sides))
+        low_m = [np.fmin.reduce(heights[:, own], axis=1) for own in feet]
+        return np.array(low_m).reshape(-1, len(heights))
 
     def distance_m(self, places_m: np.ndarray, apart: np.ndarray) -> np.ndarray:
         """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;

@@ -77,8 +77,9 @@ def _mean_errors(read: ReadValues, component: str, held_out: bool) -> pd.DataFra
 
 @dataclass(frozen=True)
 class Member:
-    """One participant of the study; what is shown of person and identification, which parameters
-    to use, the errors with them as on the person's page, what a diagnosis found, and the light of the report, if there."""
+    """One participant of the study; what is shown of person and identification, what a
+    diagnosis found, and of the person's page, if there, which parameters to use, the errors with
+    them and the light."""
 
     id: str
     facts: Mapping[str, Any] | None

@@ -54,9 +54,9 @@ def prior_from(
 
 def spread_from(unit: Unit, spreads: np.ndarray, **other: float) -> Spread:
     """As configured, with the person's own ``spreads`` (n, 7): the columns of ``regression``."""
-    own = dict(zip(("mass_sd_percent", "inertia_sd_percent"), spreads[:, [0, 4]].T, strict=True))
-    own |= {"com_sd_percent": spreads[:, 1:4], "other_table_percent": spreads[:, 5:]}
-    return Spread(**{**unit.config.prior.model_dump(), **other, **own})
+    options = {**unit.config.prior.model_dump(), **other}
+    options |= {"com_sd_percent": spreads[:, 1:4], "other_table_percent": spreads[:, 5:]}
+    return Spread(mass_sd_percent=spreads[:, 0], inertia_sd_percent=spreads[:, 4], **options)
 
 
 def recordings_of(

@@ -154,8 +154,7 @@ def _identification_trials(
         if trial.stem in contacts:
             unit.say(f"{trial.stem} does not identify: {contacts[trial.stem].words()}; {used}")
     if chosen and not named:
-        why = "since no trial is of an identification task"
-        unit.say(f"{chosen[0].stem} identifies, {why}")
+        unit.say(f"{chosen[0].stem} identifies, since no trial is of an identification task")
         if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
             unit.say(
                 "no other trial validates, so the fit is judged on the data it was "

@@ -21,7 +21,7 @@ from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import load_words, person_of
-from bsip_cli.statistics.methods import OM, RM
+from bsip_cli.statistics.methods import OM
 from bsip_cli.study.study import Participant, Trial
 
 # Field of a trial's record: kind of artifact.
@@ -185,13 +185,6 @@ def _facts(unit: Unit, kind: str, participant: Participant) -> dict[str, Any]:
     return unit.facts(kind, participant=participant) if there else {}
 
 
-def _use(unit: Unit, participant: Participant) -> str:
-    """As the person's own page says, or else as chosen; the table's where nothing was."""
-    choice = _read(unit, "choice", participant)
-    chosen = choice["use"].iloc[0] if len(choice) else RM
-    return str(_facts(unit, "report-files", participant).get("use", chosen))
-
-
 def _member(unit: Unit, participant: Participant) -> cohort.Member:
     identified = _read(unit, "identification", participant)
     if len(identified):
@@ -209,7 +202,7 @@ def _member(unit: Unit, participant: Participant) -> cohort.Member:
     light = Light(**page["light"]) if page else None
     known = participant.id, first["person"], first["identification"], bool(page), refusals, searched
     errors = page.get("errors", {})
-    return cohort.Member(*known, _use(unit, participant) if errors else "", errors, light)
+    return cohort.Member(*known, page["use"] if errors else "", errors, light)
 
 
 def _origins_of_all(unit: Unit) -> Iterator[records.Origin]:

@@ -123,6 +123,11 @@ class SessionReading:
         counting = [one for one in self.plates.values() if not one.repeats]
         return bool(counting) and all(one.refusal for one in counting)
 
+    @property
+    def is_as_stated(self) -> bool:
+        """Nothing is corrected but which way the forces push."""
+        return not self.frame.moved and not any(x.reading.repairs() for x in self.plates.values())
+
     def units_of(self, trial: str) -> tuple[float, float] | None:
         """Scales of moments and points, where they are not those of the session's other trials."""
         if trial not in self.moment_scales:
@@ -265,7 +270,8 @@ def _odd_trials(
 ) -> list[str]:
     """The few trials without which forces that together are no person's are one's: half of them
     at most, which are nobody's even ``alone``, or fewer, which alone are understood alike and
-    otherwise than the others; none if it may be these or those."""
+    otherwise than the others; none if it may be these or those. Half of them cannot be against a
+    correction: that of all others would be no session's."""
     some = list(alone)
     own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
     refused = [k for k, one in alone.items() if one.is_refused]
@@ -275,10 +281,15 @@ def _odd_trials(
     few = [list(one) for one in dict.fromkeys(map(tuple, alike)) if 2 * len(one) < len(some)]
     may_be = [refused] if refused else few
     rest = [[one for k, one in enumerate(trials) if k not in gone] for gone in may_be]
+    found = {
+        k: session_reading(others, limits)
+        for k, others in enumerate(rest)
+        if any(one.sources for one in others)
+    }
     clear = [
-        gone
-        for gone, others in zip(may_be, rest, strict=True)
-        if any(one.sources for one in others) and not session_reading(others, limits).refusals()
+        may_be[k]
+        for k, one in found.items()
+        if not one.refusals() and (one.is_as_stated or 2 * len(may_be[k]) < len(some))
     ]
     return [trials[k].name for k in clear[0]] if len(clear) == 1 else []
 

@@ -12,9 +12,7 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs, runs, times
-from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.plate_wrench import FrameWrench
-from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, LOWEST_M, lowest, outline
 
@@ -40,30 +38,6 @@ _SAID = 2, 6  # of times: digits, and so many at most
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """A plate: wrench (N, 6) on the body about the world's origin, corners (4, 3) or None."""
-
-    wrench: np.ndarray
-    corners_m: np.ndarray | None
-
-    def cop_m(self) -> np.ndarray:
-        """On the plate's surface, (N, 2); NaN without load."""
-        height_m = 0.0 if self.corners_m is None else float(self.corners_m[:, 2].mean())
-        return cop_at_height(self.wrench[:, :3], self.wrench[:, 3:], height_m)
-
-
-@dataclass(frozen=True, eq=False)
-class PlateLoad:
-    """One plate at the marker rate."""
-
-    name: str
-    corners_m: np.ndarray | None  # (4, 3)
-    force_z_N: np.ndarray  # (n_frames,)
-    cop_m: np.ndarray  # (n_frames, 2), NaN without load
-    usable: np.ndarray  # (n_frames,) bool
-
-
-@dataclass(frozen=True, eq=False)
 class ContactWindows:
     """In which frames every contact is measured, and the reasons for those that are left out."""
 
@@ -73,21 +47,9 @@ class ContactWindows:
     reasons: tuple[Finding, ...]
 
 
-def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, ...]:
-    """The plates of a recording as `contact_windows` wants them."""
-    loads = []
-    for plate, rows, usable in zip(
-        recording.plates, wrench.per_plate, wrench.plate_usable, strict=True
-    ):
-        cop = Reading(rows, plate.corners_m).cop_m()
-        cop[rows[:, 2] < TOUCHED_N] = np.nan
-        loads.append(PlateLoad(plate.name, plate.corners_m, rows[:, 2], cop, usable))
-    return tuple(loads)
-
-
-def bears_alone(plate: PlateLoad, plates: Sequence[PlateLoad]) -> np.ndarray:
+def bears_alone(plate: Plate, plates: Sequence[Plate]) -> np.ndarray:
     """Frames in which no other plate is touched, (n_frames,) bool."""
-    others = [np.abs(one.force_z_N) < TOUCHED_N for one in plates if one is not plate]
+    others = [np.abs(one.lift_N) < TOUCHED_N for one in plates if one is not plate]
     return np.logical_and.reduce([plate.usable, *others])
 
 
@@ -113,10 +75,10 @@ class FootContacts:
 def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],
     rate_hz: float,
-    plates: Sequence[PlateLoad],
+    plates: Sequence[Plate],
     n_frames: int,
 ) -> FootContacts:
-    """Frames in which no foot stands beside the plates.
+    """Frames in which no foot stands beside the plates, which are at the marker rate.
 
     ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3).
     """
@@ -124,7 +86,7 @@ def foot_contacts(
     if not plates:
         return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
     usable = np.logical_and.reduce([plate.usable for plate in plates])
-    total = np.sum([plate.force_z_N for plate in plates], axis=0)
+    total = np.sum([plate.lift_N for plate in plates], axis=0)
     on_ground, on_plate, reasons, measured = {}, {}, [], usable.copy()
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, rate_hz)
@@ -223,9 +185,7 @@ class _Foot:
         return float(lowest(self.lowest_m[:, None])[0]) < corners_m[:, 2].mean() + LOWEST_M[0]
 
 
-def _touches(
-    foot: _Foot, plates: Sequence[PlateLoad], rate_hz: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _touches(foot: _Foot, plates: Sequence[Plate], rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
     """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
 
     A foot on a moving belt is not slow, nor is one on a step as low as elsewhere: the load under it
@@ -234,9 +194,9 @@ def _touches(
     on_step = np.zeros(len(foot.seen), bool)
     near_load = np.zeros(len(foot.seen), bool)  # a marker is near the load of a plate
     for plate in plates:
-        gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
+        gap = np.linalg.norm(foot.position_m - plate.cop_m()[:, None], axis=-1)
         is_close = (np.nan_to_num(gap, nan=np.inf) < _COP_DISTANCE_M).any(axis=1)
-        bears = (plate.force_z_N > TOUCHED_N) & is_close
+        bears = (plate.lift_N > TOUCHED_N) & is_close
         near_load |= bears
         if plate.corners_m is not None and foot.goes_below(plate.corners_m):
             above = foot.lowest_m - plate.corners_m[:, 2].mean()
@@ -338,7 +298,7 @@ class FootForces:
 
 
 def foot_forces(
-    plates: Sequence[Reading],
+    plates: Sequence[Plate],
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     on_plate: Mapping[str, np.ndarray],
@@ -376,13 +336,13 @@ def foot_forces(
     return FootForces(wrench, plate, unknown)
 
 
-def plate_noise(plate: Reading, at_m: np.ndarray) -> np.ndarray:
+def plate_noise(plate: Plate, at_m: np.ndarray) -> np.ndarray:
     """(6,) standard deviation of the white noise of a loaded plate's channels about a point (3,).
 
     Third differences leave little of movement; the median of their size is not moved by impacts.
     Their variance is 20 times that of the noise.
     """
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
+    loaded = np.nan_to_num(plate.lift_N) > TOUCHED_N
     moved = plate.wrench.copy()
     moved[:, 3:] -= np.cross(at_m, plate.wrench[:, :3])
     whole = loaded[3:] & loaded[2:-1] & loaded[1:-2] & loaded[:-3]
@@ -394,7 +354,7 @@ def plate_noise(plate: Reading, at_m: np.ndarray) -> np.ndarray:
 
 
 def _owner(
-    plate: Reading,
+    plate: Plate,
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     rate_hz: float,
@@ -403,7 +363,7 @@ def _owner(
 
     The owner of a load owns what the plate reads shortly before and after it.
     """
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
+    loaded = np.nan_to_num(plate.lift_N) > TOUCHED_N
     on = np.zeros((2, len(loaded)), bool)
     for k, side in enumerate(SIDES):
         if plate.corners_m is None:
@@ -427,7 +387,7 @@ def _owner(
 
 
 def _by_load(
-    plate: Reading,
+    plate: Plate,
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     asked: np.ndarray,

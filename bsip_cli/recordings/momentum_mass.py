@@ -22,9 +22,9 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import (
     FootContacts,
-    PlateLoad,
     bears_alone,
 )
+from bsip_cli.recordings.model import Plate
 from bsip_cli.recordings.trunk_motion import low_pass, mean_path
 from bsip_cli.segments import SEGMENTS, without_side
 
@@ -215,13 +215,13 @@ def intervals_of(
 def intervals_alone(
     markers_m: Mapping[str, np.ndarray],
     feet: FootContacts,
-    plates: Sequence[PlateLoad],
+    plates: Sequence[Plate],
     rate_hz: float,
 ) -> dict[str, tuple[Interval, ...]]:
     """The same of each plate, while it bears the person alone."""
     return {
         one.name: intervals_of(
-            markers_m, one.force_z_N, feet.surely_measured & bears_alone(one, plates), rate_hz
+            markers_m, one.lift_N, feet.surely_measured & bears_alone(one, plates), rate_hz
         )
         for one in plates
     }

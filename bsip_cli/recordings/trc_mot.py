@@ -207,7 +207,7 @@ def _source(
         known=~missing,
         rotation_world_lab=rotation,
     )
-    wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
+    wrench = source.plate(PlateReading()).wrench  # points alone leap where the load begins
     samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
     if source.points is not None and source.points_move:
         # Loads without a point are marked once it is known whose points they are.

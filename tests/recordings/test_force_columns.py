@@ -330,7 +330,7 @@ def _standing(tmp_path, keep="vpt", unload=slice(0, 0), nan="pt", edit=lambda co
 def test_no_force_needs_no_point(tmp_path, nan):
     recording = _standing(tmp_path, unload=slice(0, 20), nan=nan)
     (plate,) = recording.plates
-    assert plate.usable.all() and not plate.wrench()[:20].any()
+    assert plate.usable.all() and not plate.wrench[:20].any()
     assert "analog_nan" not in [f.check for f in recording.findings]
 
 
@@ -353,7 +353,7 @@ def test_what_is_zero_by_definition_may_be_left_out(tmp_path, names):
         return {named[name[0]].format(name[-2]): columns[name] for name in kept}
 
     whole, read = _standing(tmp_path), _standing(tmp_path, edit=flat)
-    np.testing.assert_allclose(read.plates[0].wrench(), whole.plates[0].wrench(), atol=1e-9)
+    np.testing.assert_allclose(read.plates[0].wrench, whole.plates[0].wrench, atol=1e-9)
     (said,) = (f for f in read.findings if f.check == "columns")
     assert (said.level, said.found) == ("info", "no columns for a part of its point and moment")
 
@@ -400,7 +400,7 @@ def test_the_case_of_missing_points_without_load(shared_cases):
     for plate, same in zip(own.plates, reference.plates, strict=True):
         assert plate.usable.all()
         loaded = plate.force_N[:, 2] > 0
-        np.testing.assert_allclose(plate.wrench()[loaded], same.wrench()[loaded], atol=1e-6)
+        np.testing.assert_allclose(plate.wrench[loaded], same.wrench[loaded], atol=1e-6)
 
 
 def test_the_case_of_forces_only(shared_cases):
@@ -499,7 +499,7 @@ def _check_drawn(folder: Path, seed: int) -> None:
     assert recording.analog_rate_hz == pytest.approx(force_hz, rel=2e-5), drawn
     assert plate.usable.mean() > 0.97, drawn
     usable = plate.usable[: len(force)]
-    own, true = plate.wrench()[: len(usable)], np.hstack([force, moment])[: len(usable)]
+    own, true = plate.wrench[: len(usable)], np.hstack([force, moment])[: len(usable)]
     sample_and_a_half = 1.5 * np.abs(np.diff(true, axis=0)).max(axis=0) + 1e-3
     assert (np.abs(own - true)[usable] < sample_and_a_half).all(), drawn
 

@@ -5,7 +5,7 @@ which foot, frame by frame."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -37,16 +37,6 @@ _LEAST_WINDOW_S = 0.1
 _SAID = 2, 6  # of times: digits, and so many at most
 
 
-@dataclass(frozen=True, eq=False)
-class ContactWindows:
-    """In which frames every contact is measured, and the reasons for those that are left out."""
-
-    valid: np.ndarray  # (n_frames,) bool: every contact is measured
-    on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
-    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
-    reasons: tuple[Finding, ...]
-
-
 def bears_alone(plate: Plate, plates: Sequence[Plate]) -> np.ndarray:
     """Frames in which no other plate is touched, (n_frames,) bool."""
     others = [np.abs(one.lift_N) < TOUCHED_N for one in plates if one is not plate]
@@ -54,12 +44,13 @@ def bears_alone(plate: Plate, plates: Sequence[Plate]) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class FootContacts:
-    """What the feet's markers say of the contacts, whatever the person's mass."""
+class Contacts:
+    """In which frames every contact is measured, as far as is known, and why not in the others: by
+    the feet's markers whatever the person's mass, then by the forces too."""
 
-    measured: np.ndarray  # (n_frames,) bool: samples usable, no foot beside the plates
+    valid: np.ndarray  # (n_frames,) bool: samples usable, nothing touches what is no plate
     on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
-    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool
+    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
     beside: np.ndarray  # (n_frames,) bool: a foot on the floor beside the plates
     usable: np.ndarray  # (n_frames,) bool
     total_N: np.ndarray  # (n_frames,), of all plates
@@ -67,9 +58,9 @@ class FootContacts:
 
     @property
     def surely_measured(self) -> np.ndarray:
-        """``measured`` where both feet have markers, (n_frames,) bool: one without may stand
+        """``valid`` where both feet have markers, (n_frames,) bool: one without may stand
         anywhere."""
-        return self.measured & (set(self.on_ground) == {"l", "r"})
+        return self.valid & (set(self.on_ground) == {"l", "r"})
 
 
 def foot_contacts(
@@ -77,22 +68,22 @@ def foot_contacts(
     rate_hz: float,
     plates: Sequence[Plate],
     n_frames: int,
-) -> FootContacts:
+) -> Contacts:
     """Frames in which no foot stands beside the plates, which are at the marker rate.
 
     ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3).
     """
     beside = nothing = np.zeros(n_frames, bool)
     if not plates:
-        return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
+        return Contacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
     usable = np.logical_and.reduce([plate.usable for plate in plates])
     total = np.sum([plate.lift_N for plate in plates], axis=0)
-    on_ground, on_plate, reasons, measured = {}, {}, [], usable.copy()
+    on_ground, on_plate, reasons, valid = {}, {}, [], usable.copy()
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz)
         off, name = on_ground[side] & ~on_plate[side], _SIDES.get(side, side) + " foot"
-        measured &= ~off & foot.seen
+        valid &= ~off & foot.seen
         beside = beside | off
         said = (
             (off & usable, "on the floor beside the plates"),
@@ -103,16 +94,16 @@ def foot_contacts(
                 reasons.append(_finding(name, f"{words}: {times(mask, rate_hz, *_SAID)}"))
     if not usable.all():
         reasons.append(_finding("", f"force samples unusable: {times(~usable, rate_hz, *_SAID)}"))
-    return FootContacts(measured, on_ground, on_plate, beside, usable, total, tuple(reasons))
+    return Contacts(valid, on_ground, on_plate, beside, usable, total, tuple(reasons))
 
 
 def contact_windows(
-    feet: FootContacts,
+    feet: Contacts,
     trunk_markers_m: np.ndarray,
     mass_kg: float | None,
     rate_hz: float,
     stands_kg: float | None = None,
-) -> ContactWindows:
+) -> Contacts:
     """Frames in which the plates measure all that touches the person.
 
     ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
@@ -124,17 +115,16 @@ def contact_windows(
     if not feet.usable.any() or mass_kg is None:
         if feet.usable.any():
             reasons += (_finding("", NO_MASS),)
-        nothing = np.zeros(len(feet.measured), bool)
-        return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
-    shortest, mismatch = round(_LEAST_WINDOW_S * rate_hz), np.zeros_like(feet.measured)
-    valid = long_runs(feet.measured, shortest)
+        return replace(feet, valid=np.zeros_like(feet.valid), reasons=reasons)
+    shortest, mismatch = round(_LEAST_WINDOW_S * rate_hz), np.zeros_like(feet.valid)
+    valid = long_runs(feet.valid, shortest)
     if (reach := reach_m_s2(trunk_markers_m, rate_hz)) is not None:
         measured_N, needed_N = low_pass(feet.total_N, rate_hz), mass_kg * reach
         weight_N = mass_kg * GRAVITY_M_S2
         allowed_N = _MISMATCH_SHARE * (weight_N + np.abs(needed_N - weight_N))
         different = np.abs(measured_N - needed_N) > allowed_N
         mismatch = long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
-        valid = long_runs(feet.measured & ~mismatch, shortest)
+        valid = long_runs(feet.valid & ~mismatch, shortest)
         # Something else may bear the person in all of these frames, though in none for sure: a foot
         # on a plate that is not there, while the body sinks. In 181 trials of real and simulated
         # recordings the means agree to 5 % with the share of the weight that quiet standing shows.
@@ -147,14 +137,14 @@ def contact_windows(
     for start, stop in runs(mismatch):  # but for those that a foot beside the plates explains
         unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
     if unexplained.any():
-        loaded = feet.measured & (feet.total_N > TOUCHED_N)
+        loaded = feet.valid & (feet.total_N > TOUCHED_N)
         cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file)"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
             cause = f"the mass by which they are judged, {mass_kg:.1f} kg, is wrong, or something "
             cause += "bears the person all the time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
         reasons += (_finding("", f"{force}: {cause} {times(unexplained, rate_hz, *_SAID)}"),)
-    return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
+    return replace(feet, valid=valid, reasons=reasons)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import (
-    FootContacts,
+    Contacts,
     bears_alone,
 )
 from bsip_cli.recordings.model import Plate
@@ -214,7 +214,7 @@ def intervals_of(
 
 def intervals_alone(
     markers_m: Mapping[str, np.ndarray],
-    feet: FootContacts,
+    feet: Contacts,
     plates: Sequence[Plate],
     rate_hz: float,
 ) -> dict[str, tuple[Interval, ...]]:

@@ -13,7 +13,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import momentum_mass
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
-    ContactWindows,
+    Contacts,
     agreeing_mass,
     contact_windows,
     foot_contacts,
@@ -130,7 +130,7 @@ def _contacts(
     segments: list[str],
     plates: tuple[Plate, ...],
     stated: StatedMass | None,
-) -> tuple[ContactWindows, tuple[momentum_mass.Interval, ...], list[Finding]]:
+) -> tuple[Contacts, tuple[momentum_mass.Interval, ...], list[Finding]]:
     """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
@@ -143,7 +143,7 @@ def _contacts(
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
     about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
-        loaded = feet.measured & momentum_mass.upright_frames(markers)
+        loaded = feet.valid & momentum_mass.upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
     return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
 
@@ -196,9 +196,7 @@ def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) ->
     return pd.DataFrame(table | {"filled": filled.filled.ravel()})
 
 
-def _wrench_table(
-    times: np.ndarray, plates: tuple[Plate, ...], contacts: ContactWindows
-) -> pd.DataFrame:
+def _wrench_table(times: np.ndarray, plates: tuple[Plate, ...], contacts: Contacts) -> pd.DataFrame:
     nothing = np.full((len(times), 6), np.nan)
     total = np.sum([plate.wrench for plate in plates], axis=0) if plates else nothing
     table = {"time_s": times} | columns(WRENCH, total) | {"valid": contacts.valid}
@@ -207,7 +205,7 @@ def _wrench_table(
     return pd.DataFrame(table)
 
 
-def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:
+def _contact_table(times: np.ndarray, contacts: Contacts) -> pd.DataFrame:
     table, nothing = {"time_s": times}, np.zeros(len(times), dtype=bool)
     for side, name in (("l", "left"), ("r", "right")):
         table[f"{name}_on_ground"] = contacts.on_ground.get(side, nothing)

@@ -11,7 +11,7 @@ import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
 from bsip_cli.recordings.contacts import (
-    ContactWindows,
+    Contacts,
     contact_windows,
     foot_contacts,
     foot_forces,
@@ -329,7 +329,7 @@ def _columns(recording: Recording, pattern: str) -> list[int]:
     return [i for i, label in enumerate(recording.labels) if re.fullmatch(pattern, label)]
 
 
-def _real_windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> ContactWindows:
+def _real_windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contacts:
     recording = read_recording(path)
     left, right, trunk = (recording.markers_m[:, _columns(recording, name)] for name in names)
     plates, rate_hz = plates_at_marker_rate(recording), recording.marker_rate_hz

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
+from bsip_cli.recordings.gaps import without_absurd, without_sentinels
 from bsip_cli.recordings.model import Finding, refusal
-from bsip_cli.recordings.scene import decided_unit, without_absurd, without_sentinels
+from bsip_cli.recordings.scene import decided_unit
 from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,

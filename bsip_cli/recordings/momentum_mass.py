@@ -64,7 +64,6 @@ NEIGHBOUR = {
 }
 """The segment that a segment hangs on, or nearly so."""
 _KINDS = tuple(NEIGHBOUR)
-_SHARED = ("common", "of_trial")
 _ROWS = {"lower_torso": "pelvis", "upper_torso": "torso", "upper_arm": "arm"}
 
 
@@ -96,13 +95,13 @@ class Interval:
 
     def record(self) -> dict[str, Any]:
         """For an artifact's facts."""
-        return {**asdict(self), **{name: list(getattr(self, name)) for name in _SHARED}}
+        return asdict(self)
 
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> Interval:
-        """From an artifact's facts."""
-        shared = {name: tuple(record[name]) for name in _SHARED}
-        return cls(**{**record, **shared})
+        """From an artifact's facts, which have lists for tuples."""
+        known: Any = {k: tuple(x) if isinstance(x, list) else x for k, x in record.items()}
+        return cls(**known)
 
 
 @dataclass(frozen=True, eq=False)

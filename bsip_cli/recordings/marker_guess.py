@@ -23,11 +23,10 @@ from bsip_cli.recordings.label_words import (
     medial_of,
 )
 from bsip_cli.recordings.labels import (
-    affixes,
+    by_person,
     columns_of,
     count_of,
     found_among,
-    owner,
     person_of,
     spelling_of,
 )
@@ -145,8 +144,8 @@ def fits(labels: Sequence[str]) -> tuple[SetFit, ...]:
     found = []
     named = [label.strip() for label in labels]
     for marker_set in map(load_marker_set, shipped_names()):
-        known = affixes(named, count_of(marker_set.wanted()))
-        bare = {affix.off(label) for label in named if (affix := owner(label, known)) is not None}
+        people = by_person(named, count_of(marker_set.wanted()))
+        bare = {name for own in people.values() for name in own.values()}
         there = found_among(sorted(bare), marker_set.wanted())
         required = [marker.label for marker in marker_set.markers if not marker.optional]
         n_found = sum(name in there for name in required)

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -363,30 +364,6 @@ def _to_right(
 # --- as TOML to be corrected ----------------------------------------------------------------------
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-_EMPTY = '{ LABEL = "landmark" }'
-_HEAD = """\
-# A marker set, made from the labels of {source}.
-# It was guessed from the labels alone: check it, and correct it before you trust a number.
-# One line per segment: LABEL = "landmark"; an empty landmark only tracks its segment.
-# Then name this file in study.toml: marker_set = "{name}"
-#
-# Landmarks (with _l or _r where it has a side):
-{landmarks}
-description = {description}
-
-[segments]
-"""
-_TAIL = """
-# Other names of a marker, in other files.
-[aliases]
-{aliases}
-# Markers that a recording may lack without a warning: those of the static trial only.
-[optional]
-markers = {optional}
-
-# How far a marker is trusted, 1 if it is not named; less where skin or shoulder girdle slides.
-[weights]
-{weights}"""
 
 
 def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str) -> str:
@@ -395,32 +372,32 @@ def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, nam
     What is not printable is left out; ``source`` names the recording, ``name`` the file to be
     written. A segment without markers is a comment that shows how to fill it in.
     """
-    markers = [m for m in marker_set.markers if m.label and m.label.isprintable()]
-    lines = []
-    for segment in SEGMENTS:
-        own = [m for m in markers if m.segment == segment]
-        members = ", ".join(f"{_key(m.label)} = {_quoted(m.landmark)}" for m in own)
-        lines.append(f"{segment} = {{ {members} }}" if own else f"# {segment} = {_EMPTY}")
-    unknown = [label for label in dict.fromkeys(unknown) if label and label.isprintable()]
-    if unknown:
-        lines += ["", "# Not understood: add them to the segment they sit on, or leave them out."]
-        lines += _wrapped(unknown)
-    head = _HEAD.format(
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    filters = (_printable, _quoted, _key, _listed, _wrapped)
+    environment.filters |= {one.__name__[1:]: one for one in filters}
+    return environment.get_template("marker_set.toml.j2").render(
         source=source,
         name=name,
-        landmarks="\n".join(_wrapped(sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}))),
-        description=_quoted(f"Made from the labels of {source}"),
+        landmarks=sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}),
+        segments=SEGMENTS,
+        markers=[m for m in marker_set.markers if _printable([m.label])],
+        unknown=_printable(dict.fromkeys(unknown)),
     )
-    aliases = [(m.label, [a for a in m.aliases if a.isprintable()]) for m in markers if m.aliases]
-    tail = _TAIL.format(
-        aliases="".join(f"{_key(label)} = {_listed(names)}\n" for label, names in aliases),
-        optional=_listed([m.label for m in markers if m.optional]),
-        weights="".join(f"{_key(m.label)} = {m.weight:g}\n" for m in markers if m.weight != 1.0),
-    )
-    return head + "\n".join(lines) + "\n" + tail
 
 
-def _listed(labels: Sequence[str]) -> str:
+def _printable(labels: Iterable[str]) -> list[str]:
+    return [label for label in labels if label and label.isprintable()]
+
+
+def _listed(labels: Iterable[str]) -> str:
     return f"[{', '.join(map(_quoted, labels))}]"
 
 
@@ -433,7 +410,7 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _wrapped(words: Sequence[str], width: int = 96) -> list[str]:
+def _wrapped(words: Sequence[str], width: int = 96) -> str:
     """The words as comment lines."""
     lines, line = [], "#"
     for word in words:
@@ -441,4 +418,4 @@ def _wrapped(words: Sequence[str], width: int = 96) -> list[str]:
             lines.append(line)
             line = "#"
         line += f" {word}"
-    return [*lines, line]
+    return "\n".join([*lines, line])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d, uniform_filter1d
-from scipy.special import i0
+from scipy.signal import upfirdn
 
 from bsip_cli.recordings.analog import long_runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
@@ -205,27 +205,10 @@ def sample_at_frames(
         n = min(n_frames, len(clean))
         values[:n], good[:n] = clean[:n], usable[:n]
         return values, good
-    slower_hz = min(signal_rate_hz, frame_rate_hz)
-    half = int(np.ceil(_HALF_LENGTH * signal_rate_hz / slower_hz))
-    values, good = np.zeros((n_frames, clean.shape[1])), np.zeros(n_frames, bool)
-    for start in range(0, n_frames, _BLOCK_FRAMES):
-        frames = np.arange(start, min(start + _BLOCK_FRAMES, n_frames))
-        centre = frames / frame_rate_hz * signal_rate_hz
-        index = np.rint(centre).astype(int)[:, None] + np.arange(-half, half + 1)
-        distance = (index - centre[:, None]) / signal_rate_hz * slower_hz  # in slower periods
-        weights = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
-        weights /= weights.sum(axis=1, keepdims=True)
-        weights[(index < 0) | (index >= len(clean))] = 0.0
-        index = np.clip(index, 0, len(clean) - 1)
-        heard = weights * usable[index]
-        inside = np.maximum(np.abs(weights).sum(axis=1), 1e-12)
-        lost, norm = np.abs(weights - heard).sum(axis=1) / inside, heard.sum(axis=1)
-        enough = norm > _LEAST_WEIGHT
-        weighted = (heard[:, None] @ clean[index])[:, 0]
-        weighted /= np.where(enough, norm, 1.0)[:, None]
-        values[frames] = np.where(enough[:, None], weighted, 0.0)
-        good[frames] = enough & (lost <= _TOUCHED)
-    return values, good
+    ratio = signal_rate_hz / frame_rate_hz
+    if ratio > 1 and abs(ratio - round(ratio)) < 1e-9 * ratio:
+        return _decimated(clean, usable, round(ratio), n_frames)
+    return _interpolated(clean, usable, signal_rate_hz, frame_rate_hz, n_frames)
 
 
 def silent_frames(sampled: np.ndarray, resampled: bool) -> np.ndarray:
@@ -235,7 +218,65 @@ def silent_frames(sampled: np.ndarray, resampled: bool) -> np.ndarray:
     return binary_dilation(silent, np.ones(2 * _HALF_LENGTH + 1)) if resampled else silent
 
 
+def _decimated(
+    clean: np.ndarray, usable: np.ndarray, ratio: int, n_frames: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """A whole number of samples per frame: one symmetric filter for all frames."""
+    half = _HALF_LENGTH * ratio
+    distance = np.arange(-half, half + 1) / ratio
+    kernel = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
+    kernel /= kernel.sum()
+
+    def every(taps: np.ndarray, signal: np.ndarray) -> np.ndarray:
+        """Its output at every ratio-th sample from the first on, (n_frames, ...)."""
+        n_zeros = max(half + ratio, n_frames * ratio + half - len(signal))
+        padded = np.concatenate([signal, np.zeros((n_zeros, *signal.shape[1:]))])
+        filtered = upfirdn(taps, padded, up=1, down=ratio, axis=0)
+        return filtered[_HALF_LENGTH : _HALF_LENGTH + n_frames]
+
+    inside = every(np.abs(kernel), np.ones(len(usable)))
+    lost = every(np.abs(kernel), (~usable).astype(float)) / np.maximum(inside, 1e-12)
+    return _judged(every(kernel, clean), every(kernel, usable.astype(float)), lost)
+
+
+def _judged(
+    weighted: np.ndarray, norm: np.ndarray, lost: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted sums (n, k) over their weight, and where that can be believed."""
+    enough = norm > _LEAST_WEIGHT
+    values = np.where(enough[:, None], weighted / np.where(enough, norm, 1.0)[:, None], 0.0)
+    return values, enough & (lost <= _TOUCHED)
+
+
+def _interpolated(
+    clean: np.ndarray,
+    usable: np.ndarray,
+    signal_rate_hz: float,
+    frame_rate_hz: float,
+    n_frames: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Any ratio: the filter is evaluated anew around each frame's time."""
+    slower_hz = min(signal_rate_hz, frame_rate_hz)
+    half = int(np.ceil(_HALF_LENGTH * signal_rate_hz / slower_hz))
+    values, good = np.zeros((n_frames, clean.shape[1])), np.zeros(n_frames, bool)
+    for start in range(0, n_frames, _BLOCK_FRAMES):
+        frames = np.arange(start, min(start + _BLOCK_FRAMES, n_frames))
+        centre = frames / frame_rate_hz * signal_rate_hz
+        index = np.rint(centre).astype(int)[:, None] + np.arange(-half, half + 1)
+        distance = (index - centre[:, None]) / signal_rate_hz * slower_hz  # in slower periods
+        weights = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
+        weights[(index < 0) | (index >= len(clean))] = 0.0
+        index = np.clip(index, 0, len(clean) - 1)
+        total = weights.sum(axis=1, keepdims=True)
+        weights = weights / np.where(total > 0, total, 1.0)
+        heard = weights * usable[index]
+        lost = np.abs(weights - heard).sum(axis=1) / np.abs(weights).sum(axis=1)
+        weighted = np.einsum("fj,fjk->fk", heard, clean[index])
+        values[frames], good[frames] = _judged(weighted, heard.sum(axis=1), lost)
+    return values, good
+
+
 def _kaiser(position: np.ndarray) -> np.ndarray:
     """Kaiser window at positions -1..1, zero outside."""
     inside = np.clip(1 - position**2, 0.0, None)
-    return np.where(inside > 0, i0(_KAISER_BETA * np.sqrt(inside)) / i0(_KAISER_BETA), 0.0)
+    return np.where(inside > 0, np.i0(_KAISER_BETA * np.sqrt(inside)) / np.i0(_KAISER_BETA), 0.0)

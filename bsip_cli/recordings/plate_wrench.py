@@ -177,14 +177,11 @@ def plates_at_marker_rate(recording: Recording) -> tuple[Plate, ...]:
     Unusable samples get no weight; frames whose filter touches them are not usable, and a
     frame without any usable sample is zero and not usable.
     """
-    rates = recording.analog_rate_hz, recording.marker_rate_hz
-    return tuple(
-        replace(plate, wrench=values, usable=good)
-        for plate in recording.plates
-        for values, good in [
-            sample_at_frames(plate.wrench, plate.usable, *rates, recording.n_frames)
-        ]
-    )
+    how, found = (recording.analog_rate_hz, recording.marker_rate_hz, recording.n_frames), []
+    for plate in recording.plates:
+        values, good = sample_at_frames(plate.wrench, plate.usable, *how)
+        found.append(replace(plate, wrench=values, usable=good))
+    return tuple(found)
 
 
 def sample_at_frames(

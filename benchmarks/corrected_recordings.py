@@ -192,8 +192,8 @@ def error_of(study: Path, other: Path) -> float:
         true, found = (read_recording(one / file.parent.name / file.name) for one in (study, other))
         first = round((found.time0_s - true.time0_s) * true.analog_rate_hz)
         for mine, its in zip(true.plates, found.plates, strict=True):
-            wrench = mine.wrench()[max(first, 0) :]
-            its_wrench = its.wrench()[max(-first, 0) :]
+            wrench = mine.wrench[max(first, 0) :]
+            its_wrench = its.wrench[max(-first, 0) :]
             count = min(len(wrench), len(its_wrench))
             apart = (its_wrench[:count] - wrench[:count])[:, :3]
             largest = max(largest, float(np.sqrt(np.nanmean(apart**2, axis=0)).max()))

@@ -23,7 +23,7 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.mot import read_mot
-from bsip_cli.recordings.plate_wrench import sample_at_frames, wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate, sample_at_frames
 from bsip_cli.recordings.read import read_recording
 from tests.real.figaroh_csv import convert
 
@@ -146,12 +146,13 @@ def _still(force_N: np.ndarray, usable: np.ndarray, rate_hz: float) -> np.ndarra
 
 def _weigh(recording: Recording) -> Weighed | None:
     """Both readings over the frames of quiet standing, else over all usable ones."""
-    wrench = wrench_at_marker_rate(recording)
-    if not recording.plates or not wrench.usable.any():
+    plates = plates_at_marker_rate(recording)
+    usable = np.all([plate.usable for plate in plates], axis=0)
+    if not plates or not usable.any():
         return None
-    own = wrench.total[:, 2]
-    still = _still(own, wrench.usable, recording.marker_rate_hz)
-    frames = still if still.any() else wrench.usable
+    own = np.sum([plate.lift_N for plate in plates], axis=0)
+    still = _still(own, usable, recording.marker_rate_hz)
+    frames = still if still.any() else usable
     own_kg = float(own[frames].mean()) / GRAVITY_M_S2
     try:
         plates_N, rate_hz = _uncorrected(recording)

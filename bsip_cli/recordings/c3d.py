@@ -15,6 +15,7 @@ from bsip_cli.recordings.c3d_content import Content, read_content
 from bsip_cli.recordings.c3d_format import Group, texts, whole_numbers
 from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.c3d_plates import plate_surfaces, read_plates
+from bsip_cli.recordings.gaps import without_absurd, without_sentinels
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.plate_reading import Opened
@@ -155,13 +156,13 @@ def _read_points(
     is_ignored = not is_valid[:, kept].any() and bool(np.isfinite(positions).any())
     if not is_ignored:
         positions[~is_valid[:, kept]] = np.nan
-    findings += scene.without_sentinels(positions)
+    findings += without_sentinels(positions)
     stated = "".join(texts(group, "UNITS")[:1])
     shown = positions if kept else np.where(is_valid[..., None], every, np.nan)
     names = [labels[i] for i in kept]
     unit_m, about_unit = scene.decided_unit(shown, names or labels, stated, "POINT:UNITS")
     positions *= unit_m
-    findings += [*scene.without_absurd(positions), *about_unit]
+    findings += [*without_absurd(positions), *about_unit]
     if is_ignored:
         findings.append(_about_invalid(positions, content.rate_hz, path))
     return tuple(names), positions, unit_m, findings

@@ -5,16 +5,14 @@ which foot, frame by frame."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs, runs, times
-from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.plate_wrench import FrameWrench
-from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, LOWEST_M, lowest, outline
 
@@ -39,65 +37,20 @@ _LEAST_WINDOW_S = 0.1
 _SAID = 2, 6  # of times: digits, and so many at most
 
 
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """A plate: wrench (N, 6) on the body about the world's origin, corners (4, 3) or None."""
-
-    wrench: np.ndarray
-    corners_m: np.ndarray | None
-
-    def cop_m(self) -> np.ndarray:
-        """On the plate's surface, (N, 2); NaN without load."""
-        height_m = 0.0 if self.corners_m is None else float(self.corners_m[:, 2].mean())
-        return cop_at_height(self.wrench[:, :3], self.wrench[:, 3:], height_m)
-
-
-@dataclass(frozen=True, eq=False)
-class PlateLoad:
-    """One plate at the marker rate."""
-
-    name: str
-    corners_m: np.ndarray | None  # (4, 3)
-    force_z_N: np.ndarray  # (n_frames,)
-    cop_m: np.ndarray  # (n_frames, 2), NaN without load
-    usable: np.ndarray  # (n_frames,) bool
-
-
-@dataclass(frozen=True, eq=False)
-class ContactWindows:
-    """In which frames every contact is measured, and the reasons for those that are left out."""
-
-    valid: np.ndarray  # (n_frames,) bool: every contact is measured
-    on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
-    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
-    reasons: tuple[Finding, ...]
-
-
-def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, ...]:
-    """The plates of a recording as `contact_windows` wants them."""
-    loads = []
-    for plate, rows, usable in zip(
-        recording.plates, wrench.per_plate, wrench.plate_usable, strict=True
-    ):
-        cop = Reading(rows, plate.corners_m).cop_m()
-        cop[rows[:, 2] < TOUCHED_N] = np.nan
-        loads.append(PlateLoad(plate.name, plate.corners_m, rows[:, 2], cop, usable))
-    return tuple(loads)
-
-
-def bears_alone(plate: PlateLoad, plates: Sequence[PlateLoad]) -> np.ndarray:
+def bears_alone(plate: Plate, plates: Sequence[Plate]) -> np.ndarray:
     """Frames in which no other plate is touched, (n_frames,) bool."""
-    others = [np.abs(one.force_z_N) < TOUCHED_N for one in plates if one is not plate]
+    others = [np.abs(one.lift_N) < TOUCHED_N for one in plates if one is not plate]
     return np.logical_and.reduce([plate.usable, *others])
 
 
 @dataclass(frozen=True, eq=False)
-class FootContacts:
-    """What the feet's markers say of the contacts, whatever the person's mass."""
+class Contacts:
+    """In which frames every contact is measured, as far as is known, and why not in the others: by
+    the feet's markers whatever the person's mass, then by the forces too."""
 
-    measured: np.ndarray  # (n_frames,) bool: samples usable, no foot beside the plates
+    valid: np.ndarray  # (n_frames,) bool: samples usable, nothing touches what is no plate
     on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
-    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool
+    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
     beside: np.ndarray  # (n_frames,) bool: a foot on the floor beside the plates
     usable: np.ndarray  # (n_frames,) bool
     total_N: np.ndarray  # (n_frames,), of all plates
@@ -105,32 +58,32 @@ class FootContacts:
 
     @property
     def surely_measured(self) -> np.ndarray:
-        """``measured`` where both feet have markers, (n_frames,) bool: one without may stand
+        """``valid`` where both feet have markers, (n_frames,) bool: one without may stand
         anywhere."""
-        return self.measured & (set(self.on_ground) == {"l", "r"})
+        return self.valid & (set(self.on_ground) == {"l", "r"})
 
 
 def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],
     rate_hz: float,
-    plates: Sequence[PlateLoad],
+    plates: Sequence[Plate],
     n_frames: int,
-) -> FootContacts:
-    """Frames in which no foot stands beside the plates.
+) -> Contacts:
+    """Frames in which no foot stands beside the plates, which are at the marker rate.
 
     ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3).
     """
     beside = nothing = np.zeros(n_frames, bool)
     if not plates:
-        return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
+        return Contacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
     usable = np.logical_and.reduce([plate.usable for plate in plates])
-    total = np.sum([plate.force_z_N for plate in plates], axis=0)
-    on_ground, on_plate, reasons, measured = {}, {}, [], usable.copy()
+    total = np.sum([plate.lift_N for plate in plates], axis=0)
+    on_ground, on_plate, reasons, valid = {}, {}, [], usable.copy()
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz)
         off, name = on_ground[side] & ~on_plate[side], _SIDES.get(side, side) + " foot"
-        measured &= ~off & foot.seen
+        valid &= ~off & foot.seen
         beside = beside | off
         said = (
             (off & usable, "on the floor beside the plates"),
@@ -141,16 +94,16 @@ def foot_contacts(
                 reasons.append(_finding(name, f"{words}: {times(mask, rate_hz, *_SAID)}"))
     if not usable.all():
         reasons.append(_finding("", f"force samples unusable: {times(~usable, rate_hz, *_SAID)}"))
-    return FootContacts(measured, on_ground, on_plate, beside, usable, total, tuple(reasons))
+    return Contacts(valid, on_ground, on_plate, beside, usable, total, tuple(reasons))
 
 
 def contact_windows(
-    feet: FootContacts,
+    feet: Contacts,
     trunk_markers_m: np.ndarray,
     mass_kg: float | None,
     rate_hz: float,
     stands_kg: float | None = None,
-) -> ContactWindows:
+) -> Contacts:
     """Frames in which the plates measure all that touches the person.
 
     ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
@@ -162,17 +115,16 @@ def contact_windows(
     if not feet.usable.any() or mass_kg is None:
         if feet.usable.any():
             reasons += (_finding("", NO_MASS),)
-        nothing = np.zeros(len(feet.measured), bool)
-        return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
-    shortest, mismatch = round(_LEAST_WINDOW_S * rate_hz), np.zeros_like(feet.measured)
-    valid = long_runs(feet.measured, shortest)
+        return replace(feet, valid=np.zeros_like(feet.valid), reasons=reasons)
+    shortest, mismatch = round(_LEAST_WINDOW_S * rate_hz), np.zeros_like(feet.valid)
+    valid = long_runs(feet.valid, shortest)
     if (reach := reach_m_s2(trunk_markers_m, rate_hz)) is not None:
         measured_N, needed_N = low_pass(feet.total_N, rate_hz), mass_kg * reach
         weight_N = mass_kg * GRAVITY_M_S2
         allowed_N = _MISMATCH_SHARE * (weight_N + np.abs(needed_N - weight_N))
         different = np.abs(measured_N - needed_N) > allowed_N
         mismatch = long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
-        valid = long_runs(feet.measured & ~mismatch, shortest)
+        valid = long_runs(feet.valid & ~mismatch, shortest)
         # Something else may bear the person in all of these frames, though in none for sure: a foot
         # on a plate that is not there, while the body sinks. In 181 trials of real and simulated
         # recordings the means agree to 5 % with the share of the weight that quiet standing shows.
@@ -185,14 +137,14 @@ def contact_windows(
     for start, stop in runs(mismatch):  # but for those that a foot beside the plates explains
         unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
     if unexplained.any():
-        loaded = feet.measured & (feet.total_N > TOUCHED_N)
+        loaded = feet.valid & (feet.total_N > TOUCHED_N)
         cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file)"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
             cause = f"the mass by which they are judged, {mass_kg:.1f} kg, is wrong, or something "
             cause += "bears the person all the time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
         reasons += (_finding("", f"{force}: {cause} {times(unexplained, rate_hz, *_SAID)}"),)
-    return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
+    return replace(feet, valid=valid, reasons=reasons)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,9 +175,7 @@ class _Foot:
         return float(lowest(self.lowest_m[:, None])[0]) < corners_m[:, 2].mean() + LOWEST_M[0]
 
 
-def _touches(
-    foot: _Foot, plates: Sequence[PlateLoad], rate_hz: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _touches(foot: _Foot, plates: Sequence[Plate], rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
     """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
 
     A foot on a moving belt is not slow, nor is one on a step as low as elsewhere: the load under it
@@ -234,9 +184,9 @@ def _touches(
     on_step = np.zeros(len(foot.seen), bool)
     near_load = np.zeros(len(foot.seen), bool)  # a marker is near the load of a plate
     for plate in plates:
-        gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
+        gap = np.linalg.norm(foot.position_m - plate.cop_m()[:, None], axis=-1)
         is_close = (np.nan_to_num(gap, nan=np.inf) < _COP_DISTANCE_M).any(axis=1)
-        bears = (plate.force_z_N > TOUCHED_N) & is_close
+        bears = (plate.lift_N > TOUCHED_N) & is_close
         near_load |= bears
         if plate.corners_m is not None and foot.goes_below(plate.corners_m):
             above = foot.lowest_m - plate.corners_m[:, 2].mean()
@@ -338,7 +288,7 @@ class FootForces:
 
 
 def foot_forces(
-    plates: Sequence[Reading],
+    plates: Sequence[Plate],
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     on_plate: Mapping[str, np.ndarray],
@@ -376,13 +326,13 @@ def foot_forces(
     return FootForces(wrench, plate, unknown)
 
 
-def plate_noise(plate: Reading, at_m: np.ndarray) -> np.ndarray:
+def plate_noise(plate: Plate, at_m: np.ndarray) -> np.ndarray:
     """(6,) standard deviation of the white noise of a loaded plate's channels about a point (3,).
 
     Third differences leave little of movement; the median of their size is not moved by impacts.
     Their variance is 20 times that of the noise.
     """
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
+    loaded = np.nan_to_num(plate.lift_N) > TOUCHED_N
     moved = plate.wrench.copy()
     moved[:, 3:] -= np.cross(at_m, plate.wrench[:, :3])
     whole = loaded[3:] & loaded[2:-1] & loaded[1:-2] & loaded[:-3]
@@ -394,7 +344,7 @@ def plate_noise(plate: Reading, at_m: np.ndarray) -> np.ndarray:
 
 
 def _owner(
-    plate: Reading,
+    plate: Plate,
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     rate_hz: float,
@@ -403,7 +353,7 @@ def _owner(
 
     The owner of a load owns what the plate reads shortly before and after it.
     """
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
+    loaded = np.nan_to_num(plate.lift_N) > TOUCHED_N
     on = np.zeros((2, len(loaded)), bool)
     for k, side in enumerate(SIDES):
         if plate.corners_m is None:
@@ -427,7 +377,7 @@ def _owner(
 
 
 def _by_load(
-    plate: Reading,
+    plate: Plate,
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     asked: np.ndarray,

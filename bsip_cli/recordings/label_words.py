@@ -13,7 +13,7 @@ from itertools import accumulate, chain, pairwise
 from typing import Any
 
 from bsip_cli.files.regular import shipped
-from bsip_cli.recordings.labels import affixes, owner, split
+from bsip_cli.recordings.labels import by_person, split
 from bsip_cli.segments import LANDMARKS, SEGMENTS
 
 _COMMON = "common"
@@ -107,12 +107,8 @@ def meanings(labels: Sequence[str]) -> dict[str, Meaning]:
 
 @lru_cache(maxsize=32)  # the trials of a person have the same labels, and all ask for them
 def _of_everybody(labels: tuple[str, ...]) -> dict[str, Meaning]:
-    known = affixes(labels, bones)
-    owned = {label: owner(label, known) for label in labels}
-    bare = {label: a.off(label.strip()) if a else split(label)[1] for label, a in owned.items()}
     found: dict[str, Meaning] = {}
-    for affix in known:
-        own = {label: bare[label] for label in labels if owned[label] == affix}
+    for own in by_person(labels, bones).values():
         of_person = _meanings(list(own.values()))
         found |= {label: of_person[b] for label, b in own.items() if b in of_person}
     return {label: found[label] for label in labels if label in found}

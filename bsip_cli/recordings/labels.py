@@ -139,9 +139,9 @@ def person_of(
         for i, label in enumerate(labels)
         if not is_unlabelled(label) and (there is None or there[i])
     ]
-    known = affixes(named, count)
-    own = {affix: [label for label in named if owner(label, known) == affix] for affix in known}
-    found = {affix: count([affix.off(label) for label in some]) for affix, some in own.items()}
+    own = by_person(named, count)
+    known = tuple(own)
+    found = {affix: count(list(bare.values())) for affix, bare in own.items()}
     if prefix:
         chosen = _wished(labels, known, prefix)
     else:
@@ -315,6 +315,16 @@ def affixes(labels: Sequence[str], count: Count) -> tuple[Affix, ...]:
         for before, group in groups.items()
         for own in _of_group(group, count)
     )
+
+
+def by_person(labels: Sequence[str], count: Count) -> dict[Affix, dict[str, str]]:
+    """Each person's labels, with what they are without what they share."""
+    known = affixes(labels, count)
+    found: dict[Affix, dict[str, str]] = {affix: {} for affix in known}
+    for label in labels:
+        if (affix := owner(label, known)) is not None:
+            found[affix][label] = affix.off(label.strip())
+    return found
 
 
 def owner(label: str, known: Sequence[Affix]) -> Affix | None:

@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -23,11 +24,10 @@ from bsip_cli.recordings.label_words import (
     medial_of,
 )
 from bsip_cli.recordings.labels import (
-    affixes,
+    by_person,
     columns_of,
     count_of,
     found_among,
-    owner,
     person_of,
     spelling_of,
 )
@@ -145,8 +145,8 @@ def fits(labels: Sequence[str]) -> tuple[SetFit, ...]:
     found = []
     named = [label.strip() for label in labels]
     for marker_set in map(load_marker_set, shipped_names()):
-        known = affixes(named, count_of(marker_set.wanted()))
-        bare = {affix.off(label) for label in named if (affix := owner(label, known)) is not None}
+        people = by_person(named, count_of(marker_set.wanted()))
+        bare = {name for own in people.values() for name in own.values()}
         there = found_among(sorted(bare), marker_set.wanted())
         required = [marker.label for marker in marker_set.markers if not marker.optional]
         n_found = sum(name in there for name in required)
@@ -364,30 +364,6 @@ def _to_right(
 # --- as TOML to be corrected ----------------------------------------------------------------------
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-_EMPTY = '{ LABEL = "landmark" }'
-_HEAD = """\
-# A marker set, made from the labels of {source}.
-# It was guessed from the labels alone: check it, and correct it before you trust a number.
-# One line per segment: LABEL = "landmark"; an empty landmark only tracks its segment.
-# Then name this file in study.toml: marker_set = "{name}"
-#
-# Landmarks (with _l or _r where it has a side):
-{landmarks}
-description = {description}
-
-[segments]
-"""
-_TAIL = """
-# Other names of a marker, in other files.
-[aliases]
-{aliases}
-# Markers that a recording may lack without a warning: those of the static trial only.
-[optional]
-markers = {optional}
-
-# How far a marker is trusted, 1 if it is not named; less where skin or shoulder girdle slides.
-[weights]
-{weights}"""
 
 
 def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str) -> str:
@@ -396,32 +372,32 @@ def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, nam
     What is not printable is left out; ``source`` names the recording, ``name`` the file to be
     written. A segment without markers is a comment that shows how to fill it in.
     """
-    markers = [m for m in marker_set.markers if m.label and m.label.isprintable()]
-    lines = []
-    for segment in SEGMENTS:
-        own = [m for m in markers if m.segment == segment]
-        members = ", ".join(f"{_key(m.label)} = {_quoted(m.landmark)}" for m in own)
-        lines.append(f"{segment} = {{ {members} }}" if own else f"# {segment} = {_EMPTY}")
-    unknown = [label for label in dict.fromkeys(unknown) if label and label.isprintable()]
-    if unknown:
-        lines += ["", "# Not understood: add them to the segment they sit on, or leave them out."]
-        lines += _wrapped(unknown)
-    head = _HEAD.format(
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    filters = (_printable, _quoted, _key, _listed, _wrapped)
+    environment.filters |= {one.__name__[1:]: one for one in filters}
+    return environment.get_template("marker_set.toml.j2").render(
         source=source,
         name=name,
-        landmarks="\n".join(_wrapped(sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}))),
-        description=_quoted(f"Made from the labels of {source}"),
+        landmarks=sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}),
+        segments=SEGMENTS,
+        markers=[m for m in marker_set.markers if _printable([m.label])],
+        unknown=_printable(dict.fromkeys(unknown)),
     )
-    aliases = [(m.label, [a for a in m.aliases if a.isprintable()]) for m in markers if m.aliases]
-    tail = _TAIL.format(
-        aliases="".join(f"{_key(label)} = {_listed(names)}\n" for label, names in aliases),
-        optional=_listed([m.label for m in markers if m.optional]),
-        weights="".join(f"{_key(m.label)} = {m.weight:g}\n" for m in markers if m.weight != 1.0),
-    )
-    return head + "\n".join(lines) + "\n" + tail
 
 
-def _listed(labels: Sequence[str]) -> str:
+def _printable(labels: Iterable[str]) -> list[str]:
+    return [label for label in labels if label and label.isprintable()]
+
+
+def _listed(labels: Iterable[str]) -> str:
     return f"[{', '.join(map(_quoted, labels))}]"
 
 
@@ -434,7 +410,7 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _wrapped(words: Sequence[str], width: int = 96) -> list[str]:
+def _wrapped(words: Sequence[str], width: int = 96) -> str:
     """The words as comment lines."""
     lines, line = [], "#"
     for word in words:
@@ -442,4 +418,4 @@ def _wrapped(words: Sequence[str], width: int = 96) -> list[str]:
             lines.append(line)
             line = "#"
         line += f" {word}"
-    return [*lines, line]
+    return "\n".join([*lines, line])

@@ -41,20 +41,30 @@ def refusal(
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """One force plate's wrench on the body, world frame, at the analog rate."""
+    """One force plate's wrench on the body, world frame, at the analog or at the marker rate."""
 
     name: str
-    force_N: np.ndarray  # (n_analog, 3); standing: z > 0
-    moment_Nm: np.ndarray  # (n_analog, 3), about the world origin
+    wrench: np.ndarray  # (n, 6): force [N], standing: z > 0; moment about the world origin [N m]
     corners_m: np.ndarray | None  # (4, 3); None where the file does not say (MOT)
-    usable: np.ndarray  # (n_analog,) bool; False for NaN, clipped or stuck samples
+    usable: np.ndarray  # (n,) bool; False for NaN, clipped or stuck samples
 
-    def wrench(self) -> np.ndarray:
-        """Force and moment side by side, (n_analog, 6)."""
-        return np.hstack([self.force_N, self.moment_Nm])
+    @property
+    def force_N(self) -> np.ndarray:
+        return self.wrench[:, :3]
 
-    def cop_m(self, height_m: float) -> np.ndarray:
-        """Centre of pressure on a horizontal surface, (n, 2); NaN without load."""
+    @property
+    def moment_Nm(self) -> np.ndarray:
+        return self.wrench[:, 3:]
+
+    @property
+    def lift_N(self) -> np.ndarray:
+        """Vertical force, (n,)."""
+        return self.wrench[:, 2]
+
+    def cop_m(self, height_m: float | None = None) -> np.ndarray:
+        """Centre of pressure at a height, (n, 2), else on its surface; NaN without load."""
+        if height_m is None:
+            height_m = 0.0 if self.corners_m is None else float(self.corners_m[:, 2].mean())
         return cop_at_height(self.force_N, self.moment_Nm, height_m)
 
 

@@ -21,10 +21,10 @@ from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import (
-    FootContacts,
-    PlateLoad,
+    Contacts,
     bears_alone,
 )
+from bsip_cli.recordings.model import Plate
 from bsip_cli.recordings.trunk_motion import low_pass, mean_path
 from bsip_cli.segments import SEGMENTS, without_side
 
@@ -64,7 +64,6 @@ NEIGHBOUR = {
 }
 """The segment that a segment hangs on, or nearly so."""
 _KINDS = tuple(NEIGHBOUR)
-_SHARED = ("common", "of_trial")
 _ROWS = {"lower_torso": "pelvis", "upper_torso": "torso", "upper_arm": "arm"}
 
 
@@ -96,13 +95,13 @@ class Interval:
 
     def record(self) -> dict[str, Any]:
         """For an artifact's facts."""
-        return {**asdict(self), **{name: list(getattr(self, name)) for name in _SHARED}}
+        return asdict(self)
 
     @classmethod
     def of(cls, record: Mapping[str, Any]) -> Interval:
-        """From an artifact's facts."""
-        shared = {name: tuple(record[name]) for name in _SHARED}
-        return cls(**{**record, **shared})
+        """From an artifact's facts, which have lists for tuples."""
+        known: Any = {k: tuple(x) if isinstance(x, list) else x for k, x in record.items()}
+        return cls(**known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,14 +213,14 @@ def intervals_of(
 
 def intervals_alone(
     markers_m: Mapping[str, np.ndarray],
-    feet: FootContacts,
-    plates: Sequence[PlateLoad],
+    feet: Contacts,
+    plates: Sequence[Plate],
     rate_hz: float,
 ) -> dict[str, tuple[Interval, ...]]:
     """The same of each plate, while it bears the person alone."""
     return {
         one.name: intervals_of(
-            markers_m, one.force_z_N, feet.surely_measured & bears_alone(one, plates), rate_hz
+            markers_m, one.lift_N, feet.surely_measured & bears_alone(one, plates), rate_hz
         )
         for one in plates
     }

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
+from bsip_cli.files.regular import read_toml, shipped
 from bsip_cli.recordings.model import Finding, refusal
 from bsip_cli.recordings.plates import LIGHT_N
 from bsip_cli.recordings.text_tables import (
@@ -182,32 +183,13 @@ def _values(
 
 # --- what the columns mean ------------------------------------------------------------------------
 
-# Parts of a column's name, in whatever order and without accents, in English, German, Spanish,
-# French, Italian and Portuguese; what is left of it names the plate.
-_WORDS = {
-    word: meaning
-    for meaning, words in {
-        "force": "force forces grf grfs kraft krafte kraefte fuerza fuerzas forza forze forca "
-        "forcas",
-        "point": "cop pressure point position druckpunkt druckmittelpunkt angriffspunkt punto "
-        "ponto presion pression pressione pressao posicion posizione posicao",
-        "moment": "moment moments grm momente drehmoment drehmomente momento momentos momenti",
-        "torque": "torque torques couple coppia",
-        "side": "left right links rechts izquierda derecha gauche droite sinistra destra esquerda "
-        "direita",
-        "ground": "ground boden suelo suolo",
-        "": "reaction reaktion reaktions reaccion reazione reacao plate platform platte plattform "
-        "messplatte plateforme plaque plataforma piattaforma pedana external externa esterna free "
-        "freies libre libero livre centre center centro application applied applicazione "
-        "aplicacion aplicacao",
-    }.items()
-    for word in words.split()
-}
-# Other words hold these too, as forearm does: they stand alone, or before an axis.
-_SHORT = {"for": "force", "mom": "moment", "cdp": "point"}
-_SHORT |= dict.fromkeys(("dx", "sx", "izq", "iz", "dch", "dcha", "esq"), "side")
+_SAID = read_toml(shipped("column_words.toml"))
+_WORDS, _SHORT = (
+    {word: meaning for meaning, words in _SAID[kind].items() for word in words.split()}
+    for kind in ("quantities", "short")
+)
 _MEANINGS = _WORDS | _SHORT | {"fp": "ground"}
-_LINKS = "of|de|di|do|da|du|des|del|della|le|la|der|am|sol|solo|axis|eje|axe|achse|asse|eixo"
+_LINKS = "|".join(_SAID["links"]["all"].split())
 _LINKS += "|(?:d|l|dell)(?=['\N{RIGHT SINGLE QUOTATION MARK}])"
 _LETTERS = {"v": "force", "f": "force", "p": "point", "c": "point", "m": "moment", "t": "torque"}
 _LETTERS |= {"a": "kistler"}  # Ax and Ay are points there, and accelerations elsewhere

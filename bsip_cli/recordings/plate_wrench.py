@@ -3,7 +3,7 @@ plates' wrench at the marker times: anti-aliased, zero phase, any ratio of rates
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, minimum_filter1d, uniform_filter1d
@@ -40,7 +40,7 @@ def without_zeros(
     for plate in recording.plates:
         unloaded = unloaded_samples(plate, rate_hz, nobody_near(recording, plate), flight)
         if unloaded.any():
-            zeros[plate.name] = np.median(plate.wrench()[unloaded], axis=0).tolist()
+            zeros[plate.name] = np.median(plate.wrench[unloaded], axis=0).tolist()
         zeroed, finding = subtract_zero(plate, unloaded, rate_hz)
         plates.append(zeroed)
         findings.append(finding)
@@ -63,9 +63,9 @@ def unloaded_samples(
     if (pulled := steady_pull(plate, rate_hz)).any():
         return pulled
     width = max(1, round(_WINDOW_S * rate_hz))
-    mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
+    mean = uniform_filter1d(np.where(plate.usable, plate.lift_N, 0.0), width)
     # Shorter zeros are noise about a software's threshold, and part of what the plate reads.
-    heard = plate.usable & ~long_runs(is_silent(plate.wrench()), width)
+    heard = plate.usable & ~long_runs(is_silent(plate.wrench), width)
     is_quiet = heard & (np.abs(mean - uniform_filter1d(mean, width)) < _QUIET_N)
     unloaded = is_quiet & (np.abs(mean) < _LARGEST_N)
     if surely_free is not None and (free := is_quiet & surely_free).any():
@@ -75,7 +75,7 @@ def unloaded_samples(
     unloaded = long_runs(unloaded, max(2, round(_LEAST_S * rate_hz)))
     if unloaded.any() or flight is None or not (aloft := flight & heard).any():
         return unloaded
-    lift = uniform_filter1d(plate.force_N[:, 2], max(1, round(_WINDOW_S / 4 * rate_hz)))[aloft]
+    lift = uniform_filter1d(plate.lift_N, max(1, round(_WINDOW_S / 4 * rate_hz)))[aloft]
     return aloft & bool(np.ptp(np.percentile(lift, [5, 95])) < _QUIET_N)
 
 
@@ -83,15 +83,14 @@ def subtract_zero(plate: Plate, unloaded: np.ndarray, rate_hz: float) -> tuple[P
     """The plate without what it reads ``unloaded`` (n_analog,) bool, and the line for the quality
     table."""
     found, action, level = "no quiet interval without load", "left its zero as it is", "info"
-    if is_silent(plate.wrench()).any():
+    if is_silent(plate.wrench).any():
         found = "exactly 0 without load, as software writes it"
     if unloaded.any():
-        offset = np.median(plate.wrench()[unloaded], axis=0)
+        offset = np.median(plate.wrench[unloaded], axis=0)
         force = ", ".join(f"{value:.1f}" for value in offset[:3])
         found = f"({force}) N in {unloaded.sum() / rate_hz:.1f} s without load"
         action, level = "subtracted it", "corrected" if is_noticed(offset) else "info"
-        force_N, moment_Nm = plate.force_N - offset[:3], plate.moment_Nm - offset[3:]
-        plate = replace(plate, force_N=force_N, moment_Nm=moment_Nm)
+        plate = replace(plate, wrench=plate.wrench - offset)
     return plate, Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)
 
 
@@ -109,7 +108,7 @@ def is_noticed(offset: np.ndarray) -> bool:
 def steady_pull(plate: Plate, rate_hz: float) -> np.ndarray:
     """Samples at which it pulls most, and hardly changes for long, (n_analog,) bool."""
     width = max(1, round(0.25 * _PULLED_S * rate_hz))
-    mean = uniform_filter1d(np.where(plate.usable, plate.force_N[:, 2], 0.0), width)
+    mean = uniform_filter1d(np.where(plate.usable, plate.lift_N, 0.0), width)
     spread = maximum_filter1d(mean, width) - minimum_filter1d(mean, width)
     lowest = min(np.percentile(mean, 1), -_LARGEST_N)
     pulls = plate.usable & (spread < _QUIET_N) & (mean < lowest + _QUIET_N)
@@ -172,39 +171,17 @@ _LEAST_WEIGHT = 0.4  # at the very ends half of the filter hangs over
 _BLOCK_FRAMES = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class FrameWrench:
-    """Wrench on the body at the marker times, world frame, about the world origin."""
-
-    names: tuple[str, ...]
-    per_plate: np.ndarray  # (n_plates, n_frames, 6): fx, fy, fz [N], mx, my, mz [N m]
-    plate_usable: np.ndarray  # (n_plates, n_frames) bool
-
-    @property
-    def total(self) -> np.ndarray:
-        """Sum of all plates, (n_frames, 6)."""
-        return self.per_plate.sum(axis=0)
-
-    @property
-    def usable(self) -> np.ndarray:
-        """Frames that no unusable sample of any plate touches, (n_frames,) bool."""
-        return np.asarray(self.plate_usable.all(axis=0))
-
-
-def wrench_at_marker_rate(recording: Recording) -> FrameWrench:
-    """Filter and sample every plate at the marker times.
+def plates_at_marker_rate(recording: Recording) -> tuple[Plate, ...]:
+    """Every plate filtered and sampled at the marker times.
 
     Unusable samples get no weight; frames whose filter touches them are not usable, and a
-    frame without any usable sample is zero and not usable. Without plates: no rows.
+    frame without any usable sample is zero and not usable.
     """
-    n_frames = recording.n_frames
-    per_plate = np.zeros((len(recording.plates), n_frames, 6))
-    usable = np.zeros(per_plate.shape[:2], bool)
-    for i, plate in enumerate(recording.plates):
-        rates = recording.analog_rate_hz, recording.marker_rate_hz
-        per_plate[i], usable[i] = sample_at_frames(plate.wrench(), plate.usable, *rates, n_frames)
-    names = tuple(plate.name for plate in recording.plates)
-    return FrameWrench(names, per_plate, usable)
+    how, found = (recording.analog_rate_hz, recording.marker_rate_hz, recording.n_frames), []
+    for plate in recording.plates:
+        values, good = sample_at_frames(plate.wrench, plate.usable, *how)
+        found.append(replace(plate, wrench=values, usable=good))
+    return tuple(found)
 
 
 def sample_at_frames(

@@ -92,13 +92,13 @@ class C3dPlate:
 
     def plate(self, reading: PlateReading) -> Plate:
         description = self.read_description(reading)
-        force, moment = np.split(self.measured @ self.matrix(reading).T, 2, axis=1)
+        wrench = self.measured @ self.matrix(reading).T
         if (moved := self._shift(reading)) is not None:
             (x, y), load = moved
             axes = reading.sign * self.rotation_world_lab @ description.rotation_lab_plate()
-            moment = moment + np.column_stack([-y * load, x * load]) @ axes[:, :2].T
+            wrench[:, 3:] += np.column_stack([-y * load, x * load]) @ axes[:, :2].T
         corners = description.corners_m @ self.rotation_world_lab.T
-        return Plate(self.name, force, moment, corners, self.usable)
+        return Plate(self.name, wrench, corners, self.usable)
 
     def level_matrices(self, reading: PlateReading) -> None:
         return None
@@ -286,8 +286,7 @@ class ForceOnPoint:
         )
 
     def plate(self, reading: PlateReading) -> Plate:
-        force, moment = np.split(self.parts() @ self.matrix(reading).T, 2, axis=1)
-        return Plate(self.name, force, moment, None, self.usable)
+        return Plate(self.name, self.parts() @ self.matrix(reading).T, None, self.usable)
 
     def level_matrices(self, reading: PlateReading) -> tuple[np.ndarray, np.ndarray] | None:
         """None where the points are no centres of pressure."""

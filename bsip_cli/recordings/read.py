@@ -13,11 +13,11 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.contacts import foot_contacts, plate_loads
+from bsip_cli.recordings.contacts import foot_contacts
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.momentum_mass import Interval, intervals_alone
 from bsip_cli.recordings.plate_reading import AS_STATED, Opened, PlateSource, lift_N
-from bsip_cli.recordings.plate_wrench import steady_pull, without_zeros, wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate, steady_pull, without_zeros
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import by_segment
 from bsip_cli.recordings.session_findings import (
@@ -165,10 +165,10 @@ def masses_alone(recording: Recording) -> dict[str, tuple[Interval, ...]]:
     """What each plate shows of the person's mass while it bears the person alone."""
     recording, *_ = without_zeros(recording)
     markers, rate_hz = by_segment(recording.labels, recording.markers_m), recording.marker_rate_hz
-    loads = plate_loads(recording, wrench_at_marker_rate(recording))
+    plates = plates_at_marker_rate(recording)
     own = {side: markers[name] for side in "lr" if (name := f"foot_{side}") in markers}
-    feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
-    return intervals_alone(markers, feet, loads, rate_hz)
+    feet = foot_contacts(own, rate_hz, plates, recording.n_frames)
+    return intervals_alone(markers, feet, plates, rate_hz)
 
 
 def _not_its_own(recording: Recording, session: SessionReading) -> str:
@@ -214,7 +214,7 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
         return "every force plate was left out"
     if not any(plate.usable.any() for plate in plates):
         return "the force plates have no usable sample"
-    total = np.sum([np.where(p.usable, p.force_N[:, 2], 0.0) for p in plates], axis=0)
+    total = np.sum([np.where(p.usable, p.lift_N, 0.0) for p in plates], axis=0)
     largest, pull = np.max(total, initial=0.0), -np.min(total, initial=0.0)
     if largest < LOADED_N and pull > LOADED_N:
         return (
@@ -235,7 +235,7 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
 def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
     """Why a plate's forces in this trial are no person's, even from another zero."""
     pulled = steady_pull(plate, rate_hz)
-    lift = plate.force_N[plate.usable, 2] - (plate.force_N[pulled, 2].mean() if pulled.any() else 0)
+    lift = plate.lift_N[plate.usable] - (plate.lift_N[pulled].mean() if pulled.any() else 0)
     if not len(lift):
         return None
     largest = np.percentile(np.abs(lift), 99.5)
@@ -253,7 +253,7 @@ def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
 
 
 def _reversed(plate: Plate) -> Finding:
-    lift = plate.force_N[plate.usable, 2]
+    lift = plate.lift_N[plate.usable]
     loaded = lift[np.abs(lift) > _LIGHTLY_LOADED_N]
     found = "a pull: the action on the plate"
     if len(loaded):
@@ -276,8 +276,8 @@ def sign_doubts(
         good = np.logical_and.reduce([p.usable for p in plates])
         if plate.name not in reversed_names or not others or good.sum() < rate_hz:
             continue
-        own = uniform_filter1d(plate.force_N[good, 2], width)
-        rest = uniform_filter1d(np.sum([p.force_N[good, 2] for p in others], axis=0), width)
+        own = uniform_filter1d(plate.lift_N[good], width)
+        rest = uniform_filter1d(np.sum([p.lift_N[good] for p in others], axis=0), width)
         if not all(
             load.mean() > LOADED_N and _LEAST_CHANGE_N < load.std() < _QUIET_SHARE * load.mean()
             for load in (own, rest)
@@ -307,7 +307,7 @@ def lost_zeros(plates: Sequence[Plate], reversed_names: list[str], recording: Re
         return ""
     frames = np.arange(recording.n_frames) / recording.marker_rate_hz
     times = np.arange(len(plates[0].usable)) / recording.analog_rate_hz
-    lifts = [np.where(plate.usable, plate.force_N[:, 2], 0.0) for plate in plates]
+    lifts = [np.where(plate.usable, plate.lift_N, 0.0) for plate in plates]
     smooth = [low_pass(np.interp(frames, times, lift), recording.marker_rate_hz) for lift in lifts]
     total = np.sum(smooth, axis=0)
     signs = [-1 if plate.name in reversed_names else 1 for plate in plates]

@@ -1,5 +1,5 @@
-"""Positions as written against a person and a laboratory: which way is up, are left and right on
-their sides, the unit of length, numbers that stand for a missing point, how tall the person is."""
+"""Positions as written against a person and a laboratory: the unit of length, how tall the person
+is, which way is up, are left and right on their sides."""
 
 from __future__ import annotations
 
@@ -11,20 +11,16 @@ import numpy as np
 
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.off_the_body import without_foreign_places
 from bsip_cli.recordings.units import length_in_m, length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
 _FEWEST_MARKERS = 4  # that make a volume
-LARGEST_LAB_M = 100.0
 _FASTEST_M_S = 15.0  # half of the markers, half of the time: a sprinter's
 _SMOOTH = 0.2  # of the markers' distance from their middle: their second difference
 _USUAL_M = 1.6
 _INCH_M = 0.0254
 _GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
-_FRAMES_LOOKED_AT = 500
-_TOLD = 3
 _FEW = 100  # frames by which a stature is found
 _LEAST, _MOST = 0.65, 1.5  # of the stated height: people sit, and markers sit on hats
 _PEOPLE_M = (0.6, 2.4)  # from one year on
@@ -110,17 +106,6 @@ def decided_unit(
     action = f"read lengths in {length_name(unit_m)}"
     about = Finding("unit", "points", found, expected, action, "corrected")
     return unit_m, [about] if is_said else []
-
-
-def without_absurd(positions_m: np.ndarray) -> list[Finding]:
-    """Turn positions (n_frames, n_markers, 3) beyond any laboratory, and those where no marker on
-    the body can be, into missing ones (in place), and say so."""
-    absurd = ((positions_m > LARGEST_LAB_M) | (positions_m < -LARGEST_LAB_M)).any(axis=-1)
-    positions_m[absurd] = np.nan
-    found = f"{int(absurd.sum())} positions more than {LARGEST_LAB_M:g} m away"
-    expected, action = "markers in a laboratory", "took them as missing"
-    about = Finding("points", "", found, expected, action, "warning")
-    return [*([about] if absurd.any() else []), *without_foreign_places(positions_m)]
 
 
 def move_like_markers(positions_m: np.ndarray, rate_hz: float) -> bool:
@@ -256,62 +241,6 @@ def no_person(height_m: float, stated_m: float | None) -> tuple[str, str, str] |
     if pairs[near] < np.log(1.2):
         cause += f" (it looks like {near})"
     return f"markers of a person {height_m:.2f} m tall", expected, cause
-
-
-# --- -16512, 9999999, 0 0 0 and their like --------------------------------------------------------
-
-
-def without_sentinels(positions: np.ndarray) -> list[Finding]:
-    """Turn positions that only say that a point is missing into NaN (in place), and say so.
-
-    ``positions`` (n_frames, n_markers, 3) in any unit, NaN = missing. Such a position lies further
-    outside the box of all others than that box is wide, and has three equal coordinates, or is to
-    the bit that of another marker too: no two markers are at one place.
-    """
-    far = _outside(positions)
-    frames, markers = np.nonzero(far)
-    if not len(frames):
-        return []
-    places, which, shared = _places(positions[far], markers)
-    is_none = ((places == places[:, :1]).all(axis=1) | shared)[which]
-    if not is_none.any():
-        return []
-    positions[frames[is_none], markers[is_none]] = np.nan
-    counts = np.bincount(which[is_none], minlength=len(places))
-    often = np.argsort(-counts, kind="stable")[:_TOLD]
-    told = " and ".join(f"({', '.join(f'{x:.7g}' for x in places[k])})" for k in often if counts[k])
-    more = ", and others" if (counts > 0).sum() > _TOLD else ""
-    found = (
-        f"{is_none.sum()} positions of {len(np.unique(markers[is_none]))} markers are "
-        f"{told}{more}: no place, but the sign for a missing point"
-    )
-    return [Finding("points", "", found, "a gap", "took them for gaps", "corrected")]
-
-
-def _outside(positions: np.ndarray) -> np.ndarray:
-    """Positions (n_frames, n_markers) further from the box of the others than it is wide."""
-    some = positions[:: max(1, len(positions) // _FRAMES_LOOKED_AT)]
-    marker = np.broadcast_to(np.arange(some.shape[1]), some.shape[:2]).ravel()
-    some = some.reshape(-1, 3)
-    known = np.isfinite(some).all(axis=1) & (some != some[:, :1]).any(axis=1)
-    some, marker = some[known], marker[known]
-    _, which, shared = _places(some, marker)
-    alone = ~shared[which]
-    if len(np.unique(marker[alone])) < _FEWEST_MARKERS:
-        return np.zeros(positions.shape[:2], bool)
-    low, high = np.percentile(some[alone], [0.5, 99.5], axis=0)
-    width = (high - low).max()
-    with np.errstate(invalid="ignore"):
-        return ((positions < low - width) | (positions > high + width)).any(axis=-1)
-
-
-def _places(points: np.ndarray, marker: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Places (p, 3) among points (n, 3) of markers (n,), each point's, and whether several markers
-    share each."""
-    places, which = np.unique(points, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    owners = np.unique(np.column_stack([which, marker]), axis=0)[:, 0]
-    return places, which, np.bincount(owners, minlength=len(places)) > 1
 
 
 # --- which way is up ------------------------------------------------------------------------------

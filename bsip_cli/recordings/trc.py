@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
+from bsip_cli.recordings.gaps import without_absurd, without_sentinels
 from bsip_cli.recordings.model import Finding, refusal
-from bsip_cli.recordings.scene import decided_unit, without_absurd, without_sentinels
+from bsip_cli.recordings.scene import decided_unit
 from bsip_cli.recordings.text_tables import (
     ROWS_LOOKED_AT,
     Dialect,
@@ -83,8 +84,8 @@ def read_trc(path: Path) -> Trc:
         *without_absurd(positions),
     )
     stamps = Stamps(times, rows.time_digits.sizes(times))
-    counts_frames = rows.are_numbered and n_frames == len(times)
-    return Trc(labels, stamps, positions, tuple(rates), counts_frames, findings)
+    counts_frames = (np.diff(rows.frames) == 1).all() and n_frames == len(times)
+    return Trc(labels, stamps, positions, tuple(rates), bool(counts_frames), findings)
 
 
 def _names(line: str, mark: str | None) -> tuple[list[str], int]:
@@ -131,12 +132,12 @@ class _Rows:
         self.names, self.apart, self.are_counted = names, apart, are_counted
         self.dialect, self.path = dialect, path
         self.n_labels = sum(map(bool, names))
-        self.times, self.positions, self.widths = array("d"), array("d"), array("L")
+        self.frames, self.times = array("d"), array("d")
+        self.positions, self.widths = array("d"), array("L")
         self.time_digits = LastDigit()
         self.widest = 0
         self.n_words, self.a_word = 0, ""
-        self.are_numbered, self.is_cut = True, False
-        self._frame = 0.0
+        self.is_cut = False
         self._most_cells = path.stat().st_size
 
     def read(self, lines: Iterable[str]) -> None:
@@ -182,9 +183,8 @@ class _Rows:
         self.widest = max(self.widest, len(cells))
         frame, time = map(number, cells[:2])
         positions, words = values_of(cells[2:])
-        self.are_numbered &= not self.times or frame == self._frame + 1
-        self._frame = frame
         self.time_digits.add(cells[1])
+        self.frames.append(frame)
         self.times.append(time)
         self.positions.extend(positions)
         self.widths.append(len(positions))

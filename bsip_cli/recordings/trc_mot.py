@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from bsip_cli.files.regular import forces_beside
 from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import check_samples, sample_findings
+from bsip_cli.recordings.gaps import LARGEST_LAB_M
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
 from bsip_cli.recordings.plate_reading import Opened, PlateReading
@@ -139,7 +140,7 @@ def _lie_below(points_m: np.ndarray, feet_m: list[np.ndarray]) -> bool:
     if not len(points) or not len(seen):
         return False
     near = cKDTree(seen[:, :2])
-    sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
+    sizes = (1.0,) if np.median(np.abs(points)) < LARGEST_LAB_M else (1e-2, 1e-3)
     ways = product((points, points.conj()), sizes, range(4))
     turned = (places * size * 1j**quarter for places, size, quarter in ways)
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
@@ -207,7 +208,7 @@ def _source(
         known=~missing,
         rotation_world_lab=rotation,
     )
-    wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
+    wrench = source.plate(PlateReading()).wrench  # points alone leap where the load begins
     samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
     if source.points is not None and source.points_move:
         # Loads without a point are marked once it is known whose points they are.

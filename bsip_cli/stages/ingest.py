@@ -13,12 +13,10 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import momentum_mass
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
-    ContactWindows,
-    PlateLoad,
+    Contacts,
     agreeing_mass,
     contact_windows,
     foot_contacts,
-    plate_loads,
 )
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
 from bsip_cli.recordings.labels import match_labels
@@ -29,8 +27,8 @@ from bsip_cli.recordings.measured_mass import (
     mass_finding,
     measured_mass,
 )
-from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.plate_wrench import FrameWrench, without_zeros, wrench_at_marker_rate
+from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate, without_zeros
 from bsip_cli.recordings.read import assemble
 from bsip_cli.recordings.session_findings import findings_about
 from bsip_cli.running.unit import Unit
@@ -73,14 +71,13 @@ def run(unit: Unit) -> None:
     longest = unit.config.ingest.max_gap_s, unit.config.ingest.max_rigid_gap_s
     filled = fill_gaps(positions, recording.marker_rate_hz, groups, *longest)
     findings += _gap_findings(names, filled)
-    wrench = wrench_at_marker_rate(recording)
+    plates = plates_at_marker_rate(recording)
     stated = asdict(recording.stated)
     rates = {name: getattr(recording, name) for name in ("marker_rate_hz", "analog_rate_hz")}
     facts = {"marker_set": marker_set.name} | rates
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
-    loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
     contacts, intervals, about_mass = _contacts(
-        unit, recording, filled.markers_m, segments, loads, about
+        unit, recording, filled.markers_m, segments, plates, stated_mass(unit, person)
     )
     table, tolerance = unit.person, unit.config.ingest.mass_tolerance_percent
     stated_otherwise = against_table(recording.stated, table.mass_kg, table.height_m, tolerance)
@@ -96,7 +93,7 @@ def run(unit: Unit) -> None:
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
     known = {"mass_stretches": [one.record() for one in intervals], "zeros": zeros}
-    unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
+    unit.write("wrench", _wrench_table(times, plates, contacts), facts | known)
     corners = [
         {"plate": plate.name, "corner": k} | dict(zip(XYZ, corner, strict=True))
         for plate in recording.plates
@@ -131,22 +128,22 @@ def _contacts(
     recording: Recording,
     markers_m: np.ndarray,
     segments: list[str],
-    loads: tuple[PlateLoad, ...],
+    plates: tuple[Plate, ...],
     stated: StatedMass | None,
-) -> tuple[ContactWindows, tuple[momentum_mass.Interval, ...], list[Finding]]:
+) -> tuple[Contacts, tuple[momentum_mass.Interval, ...], list[Finding]]:
     """When what is on the plates, the intervals that show the mass, and what is said of that;
     markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
-    feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
+    feet = foot_contacts(own, rate_hz, plates, recording.n_frames)
     intervals = momentum_mass.intervals_of(markers, feet.total_N, feet.surely_measured, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
-    alone = momentum_mass.intervals_alone(markers, feet, loads, rate_hz)
+    alone = momentum_mass.intervals_alone(markers, feet, plates, rate_hz)
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
     about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
-        loaded = feet.measured & momentum_mass.upright_frames(markers)
+        loaded = feet.valid & momentum_mass.upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
     return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
 
@@ -199,15 +196,16 @@ def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) ->
     return pd.DataFrame(table | {"filled": filled.filled.ravel()})
 
 
-def _wrench_table(times: np.ndarray, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
-    total = wrench.total if len(wrench.names) else np.full((len(times), 6), np.nan)
+def _wrench_table(times: np.ndarray, plates: tuple[Plate, ...], contacts: Contacts) -> pd.DataFrame:
+    nothing = np.full((len(times), 6), np.nan)
+    total = np.sum([plate.wrench for plate in plates], axis=0) if plates else nothing
     table = {"time_s": times} | columns(WRENCH, total) | {"valid": contacts.valid}
-    for name, rows in zip(wrench.names, wrench.per_plate, strict=True):
-        table |= columns([f"plate{name}_{c}" for c in WRENCH], rows)
+    for plate in plates:
+        table |= columns([f"plate{plate.name}_{c}" for c in WRENCH], plate.wrench)
     return pd.DataFrame(table)
 
 
-def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:
+def _contact_table(times: np.ndarray, contacts: Contacts) -> pd.DataFrame:
     table, nothing = {"time_s": times}, np.zeros(len(times), dtype=bool)
     for side, name in (("l", "left"), ("r", "right")):
         table[f"{name}_on_ground"] = contacts.on_ground.get(side, nothing)

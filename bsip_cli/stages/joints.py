@@ -30,7 +30,8 @@ from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.plates import GravityTilt, Turned
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import coordinate_information
-from bsip_cli.recordings.contacts import SIDES, FootForces, Reading, foot_forces, plate_noise
+from bsip_cli.recordings.contacts import SIDES, FootForces, foot_forces, plate_noise
+from bsip_cli.recordings.model import Plate
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words
@@ -91,7 +92,7 @@ class _Trial(TrialSignals):
     """A trial with its plates, and with the feet by side: points (N, k, 3), contacts (N,)."""
 
     person: Person
-    readings: Mapping[str, Reading]
+    readings: Mapping[str, Plate]
     feet_m: dict[str, np.ndarray]
     on_ground: dict[str, np.ndarray]
     on_plate: dict[str, np.ndarray]
@@ -103,7 +104,7 @@ class _Trial(TrialSignals):
         motion = (self.q, self.v, self.a)
         return joint_loads(self.person, *motion, phi, touched, spread, every=every)
 
-    def ground(self, by_plate: Mapping[str, Reading]) -> tuple[FootForces, dict[str, Ground]]:
+    def ground(self, by_plate: Mapping[str, Plate]) -> tuple[FootForces, dict[str, Ground]]:
         """Each foot's wrench, and by segment with its noise after the low-pass."""
         readings = tuple(by_plate.values())
         feet = foot_forces(readings, self.feet_m, self.on_ground, self.on_plate, self.rate_hz)
@@ -116,7 +117,7 @@ class _Trial(TrialSignals):
                 if plate.corners_m is not None:
                     at = np.asarray(plate.corners_m.mean(axis=0))
                 else:  # the middle of its load
-                    loaded = np.nan_to_num(plate.wrench[:, 2]) > 0
+                    loaded = np.nan_to_num(plate.lift_N) > 0
                     at = np.append(np.nanmedian(plate.cop_m()[loaded], axis=0), 0.0)
                 noise[feet.plate[side].any(axis=1)] = left * plate_noise(plate, at)
             on_feet[f"foot_{side}"] = Ground(feet.wrench[side], noise, at)
@@ -131,7 +132,10 @@ def trial_of(unit: Unit, person: Person) -> _Trial:
     return _Trial(
         **vars(signals),
         person=person,
-        readings={n: Reading(one, outline(corners, n)) for n, one in signals.plates.items()},
+        readings={
+            name: Plate(name, one, outline(corners, name), np.isfinite(one).all(axis=1))
+            for name, one in signals.plates.items()
+        },
         feet_m={side: _foot_points(person, motion, side) for side in SIDES},
         on_ground={s: contacts[f"{name}_on_ground"].to_numpy() for s, name in _SIDES.items()},
         on_plate={s: contacts[f"{name}_on_plate"].to_numpy() for s, name in _SIDES.items()},

@@ -1,13 +1,18 @@
-"""What may be done to an export, one entry each: kind, slot, and a function that does it.
+"""What may be done to an export: things.csv has a row for each, kind, slot and what it sets.
 
-A function changes the export by its own draw and returns what it did in words. Two things of the
-same slot would undo each other; a circumstance has one of a slot at most.
+What draws more than the value of a field is a function here: it changes the export by its own draw
+and returns what it did in words. Two things of the same slot would undo each other; a circumstance
+has one of a slot at most.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import csv
+from ast import literal_eval
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +21,8 @@ from tests.circumstances.export import Y_UP, Export
 
 Change = Callable[[Export, np.random.Generator, int], str]
 Damage = Callable[[np.ndarray, float, np.random.Generator], np.ndarray]
+NO_EXPORT = "wrong forces"
+"""What no other understanding of the numbers puts right: it is to be refused or said."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +33,12 @@ class Thing:
         artifacts cannot show it: a stated mass in pounds. Empty: the numbers tell.
     """
 
+    id: str
     kind: str
     slot: str
+    name: str
+    formats: tuple[str, ...]
     change: Change
-    formats: tuple[str, ...] = ("c3d", "trc")
-    name: str = ""
-
-    @property
-    def id(self) -> str:
-        return self.change.__name__
 
 
 def pick(rng: np.random.Generator, options: Any) -> Any:
@@ -43,48 +47,53 @@ def pick(rng: np.random.Generator, options: Any) -> Any:
     return options[int(rng.integers(len(options)))]
 
 
+def _setting(row: Mapping[str, str]) -> Change:
+    """What sets fields, ``field=value; field=one|other``, and says so with their values."""
+    fields = [field.split("=") for field in row["sets"].split("; ")]
+
+    def change(export: Export, rng: np.random.Generator, plates: int) -> str:
+        for name, values in fields:
+            options = list(map(_value, values.split("|")))
+            setattr(export, name, pick(rng, options) if len(options) > 1 else options[0])
+        return row["says"].format(**vars(export))
+
+    return change
+
+
+def _value(text: str) -> Any:
+    """A number, True, a tuple of numbers; else a text."""
+    with suppress(ValueError, SyntaxError):
+        return literal_eval(text)
+    return text
+
+
 # Units of length
+
+
+def _points(export: Export, unit: str, stated: str) -> None:
+    export.point_unit = export.corner_unit = unit
+    export.stated_point_unit = stated
 
 
 def points_unit_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
     unit = pick(rng, ("cm", "m", "in"))
-    export.point_unit = export.corner_unit = unit
-    export.stated_point_unit = pick(rng, ("in", "inches")) if unit == "in" else unit
+    _points(export, unit, pick(rng, ("in", "inches")) if unit == "in" else unit)
     return f"points in {unit}, said to be {export.stated_point_unit}"
 
 
 def points_unit_wrong(export: Export, rng: np.random.Generator, plates: int) -> str:
     unit, stated = pick(rng, (("mm", "m"), ("m", "mm"), ("cm", "mm"), ("cm", "m"), ("in", "mm")))
-    export.point_unit = export.corner_unit = unit
-    export.stated_point_unit = stated
+    _points(export, unit, stated)
     return f"points in {unit}, said to be {stated}"
 
 
 def points_unit_blank(export: Export, rng: np.random.Generator, plates: int) -> str:
     unit = pick(rng, ("mm", "cm", "m", "in"))
-    export.point_unit = export.corner_unit = unit
-    export.stated_point_unit = ""
+    _points(export, unit, "")
     return f"points in {unit}, unit blank"
 
 
-def corners_other_unit(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.corner_unit = pick(rng, ("m", "cm", "in"))
-    return f"points in mm, plate corners in {export.corner_unit}"
-
-
 # Moments
-
-
-def moments_Nm_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.moment_unit = "Nm"
-    export.stated_moment_unit = pick(rng, ("Nm", "N m", "N*m", "N.m"))
-    return f"moments in N m, said to be {export.stated_moment_unit}"
-
-
-def moments_blank(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.moment_unit = pick(rng, ("Nm", "Nmm"))
-    export.stated_moment_unit = ""
-    return f"moments in {export.moment_unit}, unit blank"
 
 
 def moments_wrong(export: Export, rng: np.random.Generator, plates: int) -> str:
@@ -93,80 +102,25 @@ def moments_wrong(export: Export, rng: np.random.Generator, plates: int) -> str:
     return f"moments in {unit}, said to be {stated}"
 
 
-def mot_moments_Nmm(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.moment_unit = "Nmm"
-    return "moments in N mm"
-
-
-def mot_adapter_units(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.moment_unit, export.mot_point_unit = "Nmm", "mm"
-    return "force table with points in mm and moments in N mm"
-
-
-def mot_points_unit(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_point_unit = pick(rng, ("mm", "cm"))
-    return f"force table with points in {export.mot_point_unit}, moments in N m"
-
-
-# What the moments are about
-
-
-def surface_origin_zero(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.reference, export.origin = "surface", "zero"
-    return "moments about the surface's centre, ORIGIN zero"
-
-
-def surface_origin_given(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.reference, export.origin = "surface", "sensor"
-    return "moments about the surface's centre, ORIGIN gives the sensor"
-
-
-def origin_reversed(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.origin = "reversed"
-    return "ORIGIN with the other sign"
-
-
-def origin_place(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.origin = "place"
-    return "ORIGIN is the plate's place in the lab"
-
-
-def mot_about_centre(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.reference = "plate_centre"
-    return "points of pressure beside moments about the plate's centre"
-
-
-def mot_about_origin(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.reference = "lab_origin"
-    return "points of pressure beside moments about the lab's origin"
-
-
-def mot_no_points(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_points = False
-    export.reference = pick(rng, ("point", "plate_centre", "lab_origin"))
-    return f"no points in the force table, moments about the {export.reference}"
-
-
-def mot_no_moments(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_moments = False
-    return "no moments in the force table"
-
-
-def mot_forces_only(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_points = export.mot_moments = False
-    return "neither points nor moments in the force table"
-
-
 # Axes
 
 X_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 Z_DOWN = np.diag([1.0, -1.0, -1.0])
-Y_DOWN = Z_DOWN @ Y_UP
 
 
 def _about_vertical(degrees: float) -> np.ndarray:
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _mirror(rng: np.random.Generator) -> np.ndarray:
+    """Of one level axis."""
+    axis = pick(rng, (0, 1))
+    return np.diag([-1.0 if k == axis else 1.0 for k in range(3)])
+
+
+def _reversed_one(component: int) -> np.ndarray:
+    return np.array([-1.0 if k == component else 1.0 for k in range(6)])
 
 
 def _in_exported(turn: np.ndarray, export: Export) -> np.ndarray:
@@ -188,22 +142,17 @@ def odd_angle(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 def mirrored_all(export: Export, rng: np.random.Generator, plates: int) -> str:
-    axis = pick(rng, (0, 1))
-    export.axes = export.axes @ np.diag([-1.0 if k == axis else 1.0 for k in range(3)])
+    export.axes = export.axes @ _mirror(rng)
     return "left-handed export of points and forces"
 
 
 def mirrored_markers(export: Export, rng: np.random.Generator, plates: int) -> str:
-    axis = pick(rng, (0, 1))
-    mirror = np.diag([-1.0 if k == axis else 1.0 for k in range(3)])
-    export.marker_axes = _in_exported(mirror, export)
+    export.marker_axes = _in_exported(_mirror(rng), export)
     return "left-handed export of the points only"
 
 
 def mirrored_forces(export: Export, rng: np.random.Generator, plates: int) -> str:
-    axis = pick(rng, (0, 1))
-    mirror = np.diag([-1.0 if k == axis else 1.0 for k in range(3)])
-    export.force_axes = _in_exported(mirror, export)
+    export.force_axes = _in_exported(_mirror(rng), export)
     return "left-handed export of the forces and plates only"
 
 
@@ -215,28 +164,12 @@ def forces_turned(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 # Signs
 
-
-def all_signs(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.channel_signs = -np.ones(6)
-    return "all six channels as the force on the ground"
-
-
-def force_signs(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.channel_signs = np.array([-1.0] * 3 + [1.0] * 3)
-    return "forces with the other sign, moments not"
-
-
-def moment_signs(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.channel_signs = np.array([1.0] * 3 + [-1.0] * 3)
-    return "moments with the other sign, forces not"
-
-
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
 
 def one_component(export: Export, rng: np.random.Generator, plates: int) -> str:
     component = int(rng.integers(6))
-    export.channel_signs = np.array([-1.0 if k == component else 1.0 for k in range(6)])
+    export.channel_signs = _reversed_one(component)
     return f"component {CHANNELS[component]} with the other sign"
 
 
@@ -248,7 +181,7 @@ def one_plate_signs(export: Export, rng: np.random.Generator, plates: int) -> st
 
 def one_plate_component(export: Export, rng: np.random.Generator, plates: int) -> str:
     plate, component = _one_of(rng, plates), int(rng.integers(6))
-    export.plate_signs = {plate: np.array([-1.0 if k == component else 1.0 for k in range(6)])}
+    export.plate_signs = {plate: _reversed_one(component)}
     return f"component {CHANNELS[component]} of plate {plate + 1} with the other sign"
 
 
@@ -299,21 +232,6 @@ def corners_turned(export: Export, rng: np.random.Generator, plates: int) -> str
     return f"corners of plate {named} turned by {90 * turn} degrees"
 
 
-def corners_wound(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.corner_wound = True
-    return "corners wound the other way"
-
-
-def plate_doubled(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.doubled = True
-    return "plate 1 twice"
-
-
-def plate_sum(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.summed = True
-    return "a virtual plate that is the sum of the others"
-
-
 def plates_height(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.plate_rise_m = float(rng.choice([-1, 1]) * rng.uniform(0.2, 0.8))
     return f"the plates' surface stated {export.plate_rise_m:.2f} m too high"
@@ -323,16 +241,6 @@ def channel_twice(export: Export, rng: np.random.Generator, plates: int) -> str:
     plate, (one, other) = _one_of(rng, plates), rng.choice(6, 2, replace=False)
     export.listed_twice = {plate: (int(one), int(other))}
     return f"{CHANNELS[other]} of plate {plate + 1} listed as the channel of {CHANNELS[one]}"
-
-
-def plate_type(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.plate_type = pick(rng, (1, 3, 4))
-    return f"plates of type {export.plate_type}"
-
-
-def calibration_in_Nm(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.plate_type, export.moment_unit = 4, "Nm"
-    return "plates of type 4, CAL_MATRIX in N m, channels in V"
 
 
 # Samples of one plate, in every trial
@@ -372,11 +280,6 @@ def lost_samples(export: Export, rng: np.random.Generator, plates: int) -> str:
     return _damaged(export, rng, plates, hit, f"all zero {count} times for {length_s:.3f} s")
 
 
-def tared(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.tared = True
-    return "plates zeroed as each trial begins, whoever stands on them"
-
-
 def one_plate_gain(export: Export, rng: np.random.Generator, plates: int) -> str:
     plate, gain = _one_of(rng, plates), pick(rng, (0.5, 0.8, 1.25, 2.0))
     export.plate_gains, export.stated_mass = {plate: gain}, True
@@ -401,46 +304,15 @@ def _one_of(rng: np.random.Generator, plates: int) -> int:
 # Time
 
 
-def rates(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.marker_hz = float(pick(rng, (50, 60, 85, 120, 150, 200, 240, 250)))
-    export.analog_per_marker = int(pick(rng, (1, 2, 4, 5, 8, 10)))
-    return f"markers at {export.marker_hz:g} Hz, forces {export.analog_per_marker} times as fast"
-
-
-def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.stated_rate = pick(rng, (0.5, 0.8, 1.2, 2.0))
-    return f"the file states {export.stated_rate:g} times the cameras' rate"
-
-
-def force_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_rate = pick(rng, (0.5, 0.8, 1.2, 2.0))
-    return f"times of the force table of {export.mot_rate:g} times the plates' rate"
-
-
 def forces_late(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.late_s = float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(0.05), np.log(1.0))))
     return f"forces {export.late_s:.2f} s late"
-
-
-def forces_of_another(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.of_another = True
-    return "the force tables of the two trials exchanged"
 
 
 def few_decimals(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.marker_hz = float(pick(rng, (60, 120, 240)))
     export.time_decimals = 3 if export.marker_hz > 120 else pick(rng, (2, 3))
     return f"{export.marker_hz:g} Hz, times printed with {export.time_decimals} decimals"
-
-
-def milliseconds(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.time_unit, export.time_decimals = "ms", pick(rng, (0, 1, 3))
-    return "times in ms"
-
-
-def frame_numbers(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.time_unit = "frames"
-    return "frame numbers instead of times in the TRC"
 
 
 def shifted_start(export: Export, rng: np.random.Generator, plates: int) -> str:
@@ -489,11 +361,6 @@ def missing_values(export: Export, rng: np.random.Generator, plates: int) -> str
     return f"hidden points ({export.hidden_share:.0%} of the time) stored as {export.missing}"
 
 
-def residuals_negative(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.residuals = "negative"
-    return "all residuals -1"
-
-
 def unnamed_columns(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.unnamed = int(rng.integers(1, 4))
     return f"{export.unnamed} unnamed trajectories in every third row"
@@ -516,27 +383,7 @@ def mot_names(export: Export, rng: np.random.Generator, plates: int) -> str:
     return f"columns named {export.mot_columns.split()[0].format(n=1, a='x')}"
 
 
-def mot_file_name(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_suffix = pick(rng, (".MOT", ".sto", "_forces.mot", "_grf.mot"))
-    return f"force table in a file that ends in {export.mot_suffix}"
-
-
-def nan_when_unloaded(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mot_unloaded = "nan"
-    return "points and moments NaN while a plate is unloaded"
-
-
 # participants.tsv
-
-
-def mass_in_pounds(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.mass_unit = "lb"
-    return "mass in pounds"
-
-
-def height_in_cm(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.height_unit = pick(rng, ("cm", "in", "mm"))
-    return f"height in {export.height_unit}"
 
 
 def sex_in_words(export: Export, rng: np.random.Generator, plates: int) -> str:
@@ -558,83 +405,18 @@ def table_format(export: Export, rng: np.random.Generator, plates: int) -> str:
     )
 
 
-C3D, TEXT = ("c3d",), ("trc",)
-NO_EXPORT = "wrong forces"
-"""What no other understanding of the numbers puts right: it is to be refused or said."""
-THINGS = (
-    Thing("length unit", "length", points_unit_stated),
-    Thing("length unit", "length", points_unit_wrong),
-    Thing("length unit", "length", points_unit_blank),
-    Thing("length unit", "length", corners_other_unit, C3D),
-    Thing("moment unit", "moment", moments_Nm_stated, C3D),
-    Thing("moment unit", "moment", moments_blank, C3D),
-    Thing("moment unit", "moment", moments_wrong, C3D),
-    Thing("moment unit", "moment", mot_moments_Nmm, TEXT),
-    Thing("moment unit", "moment", mot_adapter_units, TEXT),
-    Thing("moment unit", "moment", mot_points_unit, TEXT),
-    Thing("moment reference", "reference", surface_origin_zero, C3D),
-    Thing("moment reference", "reference", surface_origin_given, C3D),
-    Thing("moment reference", "reference", origin_reversed, C3D),
-    Thing("moment reference", "reference", origin_place, C3D),
-    Thing("moment reference", "reference", mot_about_centre, TEXT),
-    Thing("moment reference", "reference", mot_about_origin, TEXT),
-    Thing("moment reference", "reference", mot_no_points, TEXT),
-    Thing("moment reference", "reference", mot_no_moments, TEXT),
-    Thing("moment reference", "reference", mot_forces_only, TEXT),
-    Thing("axes", "axes", other_axis_up),
-    Thing("axes", "axes", odd_angle),
-    Thing("mirrored", "axes", mirrored_all),
-    Thing("mirrored", "axes", mirrored_markers),
-    Thing("mirrored", "axes", mirrored_forces),
-    Thing("axes", "axes", forces_turned),
-    Thing("signs", "signs", all_signs),
-    Thing("signs", "signs", force_signs),
-    Thing("signs", "signs", moment_signs),
-    Thing("signs", "signs", one_component),
-    Thing("signs", "signs", one_plate_signs),
-    Thing("signs", "signs", one_plate_component),
-    Thing("signs", "signs", one_plate_horizontal, C3D),
-    Thing("signs", "signs", one_plate_axes, C3D),
-    Thing("signs", "signs", level_exchanged),
-    Thing("plates", "plates", plates_exchanged),
-    Thing("plates", "plates", corners_turned, C3D),
-    Thing("plates", "plates", corners_wound, C3D),
-    Thing("plates", "plates", plate_doubled),
-    Thing("plates", "plates", plate_sum),
-    Thing(NO_EXPORT, "plates_height", plates_height),
-    Thing(NO_EXPORT, "channels", channel_twice, C3D),
-    Thing("plate type", "type", plate_type, C3D),
-    Thing("plate type", "moment", calibration_in_Nm, C3D),
-    Thing("plate type", "type", sensors_exchanged, C3D),
-    Thing("samples", "samples", spikes, C3D),
-    Thing("samples", "samples", cut_off, C3D),
-    Thing("samples", "samples", lost_samples, C3D),
-    Thing(NO_EXPORT, "samples", tared),
-    Thing(NO_EXPORT, "gain", one_plate_gain),
-    Thing(NO_EXPORT, "force_unit", force_unit, TEXT),
-    Thing("time", "time", rates),
-    Thing("time", "time", other_rate_stated),
-    Thing("time", "time", force_rate_stated, TEXT),
-    Thing("time", "time", forces_late),
-    Thing(NO_EXPORT, "time", forces_of_another, TEXT),
-    Thing("time", "time", few_decimals, TEXT),
-    Thing("time", "time", milliseconds, TEXT),
-    Thing("time", "time", frame_numbers, TEXT),
-    Thing("time", "time", shifted_start, TEXT),
-    Thing("time", "time", points_start_later, TEXT),
-    Thing("labels", "labels", prefix),
-    Thing("labels", "labels", lower_case),
-    Thing("labels", "labels", separators),
-    Thing("labels", "labels", cut_labels),
-    Thing("missing", "missing", missing_values),
-    Thing("missing", "residuals", residuals_negative, C3D),
-    Thing("missing", "unnamed", unnamed_columns, TEXT),
-    Thing("force table", "names", mot_names, TEXT),
-    Thing("force table", "file", mot_file_name, TEXT),
-    Thing("force table", "unloaded", nan_when_unloaded, TEXT),
-    Thing("person", "mass", mass_in_pounds, name="mass"),
-    Thing("person", "height", height_in_cm, name="height"),
-    Thing("person", "sex", sex_in_words),
-    Thing("person", "table", table_format),
-)
+def _things() -> tuple[Thing, ...]:
+    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return tuple(
+        Thing(
+            *(row[name] for name in ("id", "kind", "slot", "name")),
+            tuple(row["formats"].split()),
+            _setting(row) if row["sets"] else globals()[row["id"]],
+        )
+        for row in rows
+    )
+
+
+THINGS = _things()
 KINDS = tuple(dict.fromkeys(thing.kind for thing in THINGS))

@@ -178,7 +178,7 @@ def corrected(hide, capsys):
 
 def wrenches(recording: Recording) -> np.ndarray:
     """(2, n, 6)."""
-    return np.stack([plate.wrench() for plate in recording.plates])
+    return np.stack([plate.wrench for plate in recording.plates])
 
 
 @pytest.mark.parametrize("faults", [(GAIN, ZERO), (TURNED, ASIDE), (LEAK,)])

@@ -12,7 +12,7 @@ import pandas as pd
 
 from bsip_cli.errors import BsipError
 from bsip_cli.pipeline import stages_named
-from bsip_cli.recordings.plate_wrench import wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.runner import perform
 from bsip_cli.running.session import open_study
@@ -216,10 +216,8 @@ def _read(path: Path) -> dict[str, np.ndarray]:
     }
     for k, label in enumerate(recording.labels):
         numbers[f"marker {label}"] = recording.markers_m[:, k]
-    wrench = wrench_at_marker_rate(recording)
-    for name, rows, usable in zip(wrench.names, wrench.per_plate, wrench.plate_usable, strict=True):
-        numbers[f"wrench {name}"] = np.where(usable[:, None], rows, np.nan)
-    for plate in recording.plates:
+    for plate in plates_at_marker_rate(recording):
+        numbers[f"wrench {plate.name}"] = np.where(plate.usable[:, None], plate.wrench, np.nan)
         if plate.corners_m is not None:
             numbers[f"corner {plate.name}"] = plate.corners_m
     return numbers

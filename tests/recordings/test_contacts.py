@@ -11,17 +11,14 @@ import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
 from bsip_cli.recordings.contacts import (
-    ContactWindows,
-    PlateLoad,
-    Reading,
+    Contacts,
     contact_windows,
     foot_contacts,
     foot_forces,
-    plate_loads,
     plate_noise,
 )
-from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_wrench import subtract_zero, unloaded_samples, wrench_at_marker_rate
+from bsip_cli.recordings.model import Plate, Recording
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate, subtract_zero, unloaded_samples
 from bsip_cli.recordings.read import read_recording
 
 RATE_HZ = 100.0
@@ -47,10 +44,17 @@ def _trunk(height: np.ndarray | float = 1.0) -> np.ndarray:
     return trunk
 
 
-def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> PlateLoad:
-    force = np.broadcast_to(np.asarray(force_N, float), (N,)).copy()
-    cop = np.where(force[:, None] > 20, [[x, 0.25]], np.nan)
-    return PlateLoad("1", corners, force, cop, np.ones(N, bool))
+def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> Plate:
+    return _read_as(np.multiply.outer(np.broadcast_to(force_N, N), _push_at([x, 0.25, 0])), corners)
+
+
+def _push_at(place_m) -> np.ndarray:
+    """A wrench of 1 N upwards there, (6,)."""
+    return np.append([0.0, 0.0, 1.0], np.cross(place_m, [0.0, 0.0, 1.0]))
+
+
+def _read_as(wrench: np.ndarray, corners: np.ndarray | None) -> Plate:
+    return Plate("1", wrench, corners, np.isfinite(wrench).all(axis=1))
 
 
 def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None):
@@ -113,9 +117,7 @@ def test_outline_has_a_tolerance():
 
 
 def test_a_foot_across_two_plates_is_measured():
-    second = PlateLoad(
-        "2", CORNERS + np.array([0, 0.5, 0]), np.zeros(N), np.full((N, 2), np.nan), np.ones(N, bool)
-    )
+    second = replace(_plate(0.0, CORNERS + np.array([0, 0.5, 0])), name="2")
     across = _foot(0.1)
     across[..., 1] = [0.45, 0.6]
     assert _windows(across, _foot(0.4), [_plate(WEIGHT_N), second]).valid.all()
@@ -239,9 +241,7 @@ def still_foot(at: np.ndarray) -> np.ndarray:
 
 
 def steady_load(at: np.ndarray, newton=300.0) -> np.ndarray:
-    force = np.zeros((N, 3))
-    force[:, 2] = newton
-    return np.hstack([force, np.cross(at, force)])
+    return np.tile(newton * _push_at(at), (N, 1))
 
 
 FEET = {"l": still_foot(LEFT), "r": still_foot(RIGHT)}
@@ -257,24 +257,24 @@ def test_each_foot_gets_the_wrench_of_its_own_plate(has_outlines):
     """Told by the outlines, or by the loads alone."""
     left, right = steady_load(LEFT, 400.0), steady_load(RIGHT, 300.0)
     outlines = (OUTLINE - ASIDE, OUTLINE + ASIDE) if has_outlines else (None, None)
-    found = told([Reading(right, outlines[0]), Reading(left, outlines[1])])
+    found = told([_read_as(right, outlines[0]), _read_as(left, outlines[1])])
     np.testing.assert_allclose(found.wrench["l"], left)
     np.testing.assert_allclose(found.wrench["r"], right)
 
 
 def test_a_foot_on_two_plates_gets_both():
     halves = [
-        Reading(steady_load(LEFT + x * AHEAD, 200.0), OUTLINE + ASIDE + y * AHEAD)
+        _read_as(steady_load(LEFT + x * AHEAD, 200.0), OUTLINE + ASIDE + y * AHEAD)
         for x, y in ((-0.05, -0.3), (0.05, 0.3))
     ]
-    found = told([*halves, Reading(steady_load(RIGHT), OUTLINE - ASIDE)])
+    found = told([*halves, _read_as(steady_load(RIGHT), OUTLINE - ASIDE)])
     np.testing.assert_allclose(found.wrench["l"][:, 2], 400.0)
     np.testing.assert_allclose(found.wrench["r"][:, 2], 300.0)
 
 
 @pytest.mark.parametrize("outline", [OUTLINE, None])
 def test_a_plate_under_both_feet_tells_of_neither(outline):
-    found = told([Reading(steady_load((LEFT + RIGHT) / 2, 700.0), outline)])
+    found = told([_read_as(steady_load((LEFT + RIGHT) / 2, 700.0), outline)])
     assert np.isnan(found.wrench["l"]).all() and np.isnan(found.wrench["r"]).all()
     words = (
         "both feet are on one plate"
@@ -288,13 +288,13 @@ def test_weight_that_shifts_over_a_plate_without_outline_is_no_foots():
     """Now over the left foot, now over the right one: both stand on it."""
     course = steady_load(LEFT, 700.0)
     course[N // 2 :] = steady_load(RIGHT, 700.0)[N // 2 :]
-    found = told([Reading(course, None)])
+    found = told([_read_as(course, None)])
     assert np.isnan(found.wrench["l"]).all() and np.isnan(found.wrench["r"]).all()
 
 
 def test_a_foot_in_the_air_bears_nothing_and_one_beside_is_unknown():
     air = {"l": YES, "r": ~YES}
-    plate = Reading(steady_load(LEFT, 700.0), OUTLINE + ASIDE)
+    plate = _read_as(steady_load(LEFT, 700.0), OUTLINE + ASIDE)
     found = told([plate], air, air)
     assert (found.wrench["r"] == 0.0).all() and np.isfinite(found.wrench["l"]).all()
     beside = told([plate], BOTH, air)
@@ -305,7 +305,7 @@ def test_a_foot_in_the_air_bears_nothing_and_one_beside_is_unknown():
 def test_a_broken_sample_is_not_zero():
     wrench = steady_load(LEFT, 700.0)
     wrench[50] = np.nan
-    found = told([Reading(wrench, OUTLINE + ASIDE)], {"l": YES, "r": ~YES}, BOTH)
+    found = told([_read_as(wrench, OUTLINE + ASIDE)], {"l": YES, "r": ~YES}, BOTH)
     assert np.isnan(found.wrench["l"][50]).all() and np.isfinite(found.wrench["l"][60]).all()
 
 
@@ -316,7 +316,7 @@ def test_noise_of_a_loaded_plate_is_its_white_noise():
     wrench = np.random.default_rng(2).normal(size=(len(t), 6)) * sd
     wrench[:, 2] += 700 + 100 * np.sin(2 * np.pi * t)
     wrench[:, 3:] += np.cross(at, wrench[:, :3])
-    np.testing.assert_allclose(plate_noise(Reading(wrench, None), at), sd, rtol=0.05)
+    np.testing.assert_allclose(plate_noise(_read_as(wrench, None), at), sd, rtol=0.05)
 
 
 OPENCAP = (r"L_(calc|toe|5meta)", r"r_(calc|toe|5meta)", r"C7|[Lr]\.(ASIS|PSIS)|[LR]_Shoulder")
@@ -329,12 +329,11 @@ def _columns(recording: Recording, pattern: str) -> list[int]:
     return [i for i, label in enumerate(recording.labels) if re.fullmatch(pattern, label)]
 
 
-def _real_windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> ContactWindows:
+def _real_windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contacts:
     recording = read_recording(path)
     left, right, trunk = (recording.markers_m[:, _columns(recording, name)] for name in names)
-    loads = plate_loads(recording, wrench_at_marker_rate(recording))
-    rate_hz = recording.marker_rate_hz
-    feet = foot_contacts({"l": left, "r": right}, rate_hz, loads, recording.n_frames)
+    plates, rate_hz = plates_at_marker_rate(recording), recording.marker_rate_hz
+    feet = foot_contacts({"l": left, "r": right}, rate_hz, plates, recording.n_frames)
     return contact_windows(feet, trunk, mass_kg, rate_hz)
 
 

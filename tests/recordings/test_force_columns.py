@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,93 +23,8 @@ from tests.recordings.recording_writers import (
 )
 
 N = 60
-DIALECTS = {  # force, point, moment of two plates
-    "opensim": ("ground_force_{p}_v{a}", "ground_force_{p}_p{a}", "ground_torque_{p}_{a}", "1 2"),
-    "in front": ("{p}_ground_force_v{a}", "{p}_ground_force_p{a}", "{p}_ground_torque_{a}", "l r"),
-    "number in front": (
-        "{p}_ground_force_v{a}",
-        "{p}_ground_force_p{a}",
-        "{p}_ground_torque_{a}",
-        "1 R",
-    ),
-    "joined": ("ground_force{p}_v{a}", "ground_force{p}_p{a}", "ground_torque{p}_{a}", "1 2"),
-    "moments": ("ground_force_{p}_v{a}", "ground_force_{p}_p{a}", "ground_moment_{p}_m{a}", "r l"),
-    "sides": ("ground_force_{p}_v{a}", "ground_force_{p}_p{a}", "ground_torque_{p}_{a}", "left R"),
-    "vicon": ("Force.F{a}{p}", "CoP.C{a}{p}", "Moment.M{a}{p}", "1 2"),
-    "nexus": ("Plate {p} - Force.F{a}", "Plate {p} - CoP.C{a}", "Plate {p} - Moment.M{a}", "1 2"),
-    "plate in front": ("FP{p}_F{a}", "FP{p}_COP{a}", "FP{p}_M{a}", "1 2"),
-    "plate and letter": ("FP{p}_F{a}", "FP{p}_P{a}", "FP{p}_M{a}", "1 2"),
-    "axis apart": ("F{p}_{a}", "P{p}_{a}", "M{p}_{a}", "1 2"),
-    "axis last": ("F{p}{A}", "P{p}{A}", "M{p}{A}", "1 2"),
-    "plate last": ("F{a}{p}", "COP_{a}_{p}", "M{a}{p}", "1 2"),
-    "spelt": (
-        "Force Plate {p}.F{a}",
-        "Force Plate {p} CoP{a}",
-        "Force Plate {p} Free Moment {A}",
-        "A B",
-    ),
-    "camel": ("{p}Force{A}", "{p}COP{A}", "{p}Torque{A}", "Left Right"),
-    "brackets": ("F{a}_{p} (N)", "COP{a}_{p} (m)", "T{a}_{p} (Nm)", "1 2"),
-    "visual3d": ("{p}_GRF_{A}", "{p}_COP_{A}", "{p}_FREEMOMENT_{A}", "LEFT RIGHT"),
-    "brand": (
-        "AMTI {p} Force {A}",
-        "AMTI {p} Centre of Pressure {A}",
-        "AMTI {p} Moment {A}",
-        "1 2",
-    ),
-    "one letter": ("{p}F{a}", "{p}P{a}", "{p}T{a}", "L R"),
-    "d-flow": ("FP{p}.For{A}", "FP{p}.Cop{A}", "FP{p}.Mom{A}", "1 2"),
-    "german": ("Kraft_{p}_{a}", "Druckpunkt_{p}_{a}", "Moment_{p}_{a}", "1 2"),
-    "german, of plates": (
-        "Kraftmessplatte {p} Kraft {A}",
-        "Druckpunkt {A} Kraftmessplatte {p}",
-        "Drehmoment {A} Kraftmessplatte {p}",
-        "1 2",
-    ),
-    "german, of sides": (
-        "Bodenreaktionskraft_{p}_{a}",
-        "Angriffspunkt_{p}_{a}",
-        "freies_Moment_{p}_{a}",
-        "links rechts",
-    ),
-    "spanish": ("fuerza_{p}_{a}", "cdp_{p}_{a}", "momento_{p}_{a}", "1 2"),
-    "spanish, axis in front": (
-        "{A} Fuerza plataforma {p}",
-        "{A} Centro de presi\N{LATIN SMALL LETTER O WITH ACUTE}n plataforma {p}",
-        "{A} Momento plataforma {p}",
-        "1 2",
-    ),
-    "french": ("force_{p}_{a}", "point_{p}_{a}", "moment_{p}_{a}", "1 2"),
-    "french, of sides": (
-        "Force de r\N{LATIN SMALL LETTER E WITH ACUTE}action du sol {p} {A}",
-        "Point d'application de la force {p} {A}",
-        "Moment libre {p} {A}",
-        "gauche D",
-    ),
-    "italian, short sides": ("F{a}_{p}", "P{a}_{p}", "M{a}_{p}", "dx sx"),
-    "spanish, short sides": ("Fuerza_{p}_{a}", "cdp_{p}_{a}", "momento_{p}_{a}", "iz dch"),
-    "italian": ("{p}_forza_{a}", "{p}_centro_di_pressione_{a}", "{p}_momento_{a}", "sinistra d"),
-    "portuguese": (
-        "For\N{LATIN SMALL LETTER C WITH CEDILLA}a {A} ({p})",
-        "Ponto de aplica\N{LATIN SMALL LETTER C WITH CEDILLA}ao {A} ({p})",
-        "Momento {A} ({p})",
-        "E D",
-    ),
-    "of a force plate": (
-        "F{a} (N) Force Plate {p}",
-        "CoP {A} (m) Force Plate {p}",
-        "Moment {A} (Nm) Force Plate {p}",
-        "1 2",
-    ),
-    "axis first": ("{A}_force_{p}", "{A}Cop{p}", "{A}Moment{p}", "1 2"),
-    "of a pressure plate": (
-        "Force{A} pressure plate {p}",
-        "Cop{A} pressure plate {p}",
-        "Mom{A} pressure plate {p}",
-        "1 2",
-    ),
-    "upper": ("GROUND_FORCE_{p}_V{A}", "GROUND_FORCE_{p}_P{A}", "GROUND_MOMENT_{p}_M{A}", "1 2"),
-}
+with Path(__file__).with_name("force_columns.csv").open(encoding="utf-8", newline="") as _file:
+    DIALECTS = {name: parts for name, *parts in list(csv.reader(_file))[1:]}  # two plates
 
 
 def _values() -> dict[str, np.ndarray]:
@@ -330,7 +246,7 @@ def _standing(tmp_path, keep="vpt", unload=slice(0, 0), nan="pt", edit=lambda co
 def test_no_force_needs_no_point(tmp_path, nan):
     recording = _standing(tmp_path, unload=slice(0, 20), nan=nan)
     (plate,) = recording.plates
-    assert plate.usable.all() and not plate.wrench()[:20].any()
+    assert plate.usable.all() and not plate.wrench[:20].any()
     assert "analog_nan" not in [f.check for f in recording.findings]
 
 
@@ -353,7 +269,7 @@ def test_what_is_zero_by_definition_may_be_left_out(tmp_path, names):
         return {named[name[0]].format(name[-2]): columns[name] for name in kept}
 
     whole, read = _standing(tmp_path), _standing(tmp_path, edit=flat)
-    np.testing.assert_allclose(read.plates[0].wrench(), whole.plates[0].wrench(), atol=1e-9)
+    np.testing.assert_allclose(read.plates[0].wrench, whole.plates[0].wrench, atol=1e-9)
     (said,) = (f for f in read.findings if f.check == "columns")
     assert (said.level, said.found) == ("info", "no columns for a part of its point and moment")
 
@@ -400,7 +316,7 @@ def test_the_case_of_missing_points_without_load(shared_cases):
     for plate, same in zip(own.plates, reference.plates, strict=True):
         assert plate.usable.all()
         loaded = plate.force_N[:, 2] > 0
-        np.testing.assert_allclose(plate.wrench()[loaded], same.wrench()[loaded], atol=1e-6)
+        np.testing.assert_allclose(plate.wrench[loaded], same.wrench[loaded], atol=1e-6)
 
 
 def test_the_case_of_forces_only(shared_cases):
@@ -499,7 +415,7 @@ def _check_drawn(folder: Path, seed: int) -> None:
     assert recording.analog_rate_hz == pytest.approx(force_hz, rel=2e-5), drawn
     assert plate.usable.mean() > 0.97, drawn
     usable = plate.usable[: len(force)]
-    own, true = plate.wrench()[: len(usable)], np.hstack([force, moment])[: len(usable)]
+    own, true = plate.wrench[: len(usable)], np.hstack([force, moment])[: len(usable)]
     sample_and_a_half = 1.5 * np.abs(np.diff(true, axis=0)).max(axis=0) + 1e-3
     assert (np.abs(own - true)[usable] < sample_and_a_half).all(), drawn
 

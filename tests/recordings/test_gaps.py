@@ -10,10 +10,16 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.gaps import fill_gaps, held_markers, repeated_frames, without_repeats
+from bsip_cli.recordings.gaps import (
+    fill_gaps,
+    held_markers,
+    repeated_frames,
+    without_absurd,
+    without_repeats,
+    without_sentinels,
+)
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.scene import without_absurd, without_sentinels
 from tests.recordings.recording_writers import standing_markers, write_c3d, write_trc
 
 N, K = 240, 12

@@ -16,11 +16,11 @@ from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_wrench import (
     lost_baseline,
     nobody_near,
+    plates_at_marker_rate,
     sample_at_frames,
     silent_frames,
     subtract_zero,
     unloaded_samples,
-    wrench_at_marker_rate,
 )
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate
@@ -88,7 +88,7 @@ def test_any_number_of_plates_overlapping_or_not(tmp_path, n_plates):
     recording = _read(tmp_path, *specs)
     assert len(recording.plates) == n_plates
     if n_plates:
-        total = np.sum([plate.wrench() for plate in recording.plates], axis=0)
+        total = np.sum([plate.wrench for plate in recording.plates], axis=0)
         stated = np.hstack([np.sum(forces, axis=0), np.sum(moments, axis=0)])
         np.testing.assert_allclose(total, stated, atol=0.1)
 
@@ -151,7 +151,7 @@ def test_analog_at_the_marker_rate(tmp_path):
 
 def _plate(force_z_N: np.ndarray, name: str = "1", corners_m: np.ndarray = CORNERS_M) -> Plate:
     force = np.column_stack([0 * force_z_N, 0 * force_z_N, force_z_N])
-    return Plate(name, force, 0 * force, corners_m, np.ones(len(force), bool))
+    return Plate(name, np.hstack([force, 0 * force]), corners_m, np.ones(len(force), bool))
 
 
 def test_weight_that_does_not_shift_tells_a_lost_zero():
@@ -197,7 +197,7 @@ def test_kistlers_polynomial_moves_the_centre_of_pressure():
 
 def zero_of(plate: Plate, unloaded: np.ndarray) -> np.ndarray:
     zeroed, _ = subtract_zero(plate, unloaded, RATE_HZ)
-    return (plate.wrench() - zeroed.wrench())[0]
+    return (plate.wrench - zeroed.wrench)[0]
 
 
 def test_a_large_zero_counts_where_nobody_is_near():
@@ -243,7 +243,7 @@ def _offset_plate(load_N: np.ndarray) -> Plate:
     noise = np.random.default_rng(2).normal(0, 1.0, (len(load_N), 6))
     wrench = OFFSET + noise
     wrench[:, 2] += load_N
-    return Plate("1", wrench[:, :3], wrench[:, 3:], None, np.ones(len(load_N), bool))
+    return Plate("1", wrench, None, np.ones(len(load_N), bool))
 
 
 def _step() -> np.ndarray:
@@ -259,13 +259,11 @@ def test_offset_is_found_and_subtracted():
     np.testing.assert_allclose(zero_of(plate, unloaded), OFFSET, atol=0.3)
     corrected, finding = subtract_zero(plate, unloaded, RATE_HZ)
     assert finding.level == "corrected"
-    assert abs(np.median(corrected.force_N[:900, 2])) < 0.3
+    assert abs(np.median(corrected.lift_N[:900])) < 0.3
 
 
-def _silent_where(where: np.ndarray, plate: Plate) -> Plate:
-    """As software writes zeros there."""
-    force, moment = (np.where(where[:, None], 0.0, x) for x in (plate.force_N, plate.moment_Nm))
-    return replace(plate, force_N=force, moment_Nm=moment)
+def _silent_where(mask: np.ndarray, plate: Plate) -> Plate:
+    return replace(plate, wrench=np.where(mask[:, None], 0.0, plate.wrench))
 
 
 def test_zeros_that_software_wrote_are_no_reading():
@@ -278,7 +276,7 @@ def test_zeros_that_software_wrote_are_no_reading():
 def test_zeros_that_do_not_last_are_noise_about_a_threshold():
     """Software sets to 0 what is below 9 N; the plate reads 12 N with noise of 5 N."""
     plate = _offset_plate(np.random.default_rng(5).normal(0, 5.0, 4000))
-    low = np.abs(plate.force_N[:, 2]) < 9
+    low = np.abs(plate.lift_N) < 9
     assert 0.15 < low.mean() < 0.5
     some = _silent_where(low, plate)
     unloaded = unloaded_samples(some, RATE_HZ)
@@ -372,14 +370,12 @@ def test_unusable_samples_mark_frames_and_do_not_leak():
     np.testing.assert_allclose(values[good], 3.0, rtol=1e-12)
 
 
-def test_plates_are_summed():
-    n = 1000
-    plates = tuple(
-        Plate(str(i), np.full((n, 3), i), np.full((n, 3), -i), None, np.ones(n, bool))
-        for i in (1.0, 2.0)
-    )
+def test_plates_at_the_marker_rate():
+    plate = Plate("1", np.full((1000, 6), [3.0] * 3 + [-3.0] * 3), None, np.ones(1000, bool))
     markers = np.zeros((100, 1, 3))
-    recording = Recording(Path("a"), 100.0, ("A",), markers, 1000.0, plates, (), np.eye(3), "", 0.5)
-    wrench = wrench_at_marker_rate(recording)
-    np.testing.assert_allclose(wrench.total, np.tile([3.0] * 3 + [-3.0] * 3, (100, 1)))
-    assert wrench.usable.all()
+    recording = Recording(
+        Path("a"), 100.0, ("A",), markers, 1000.0, (plate,), (), np.eye(3), "", 0.5
+    )
+    (found,) = plates_at_marker_rate(recording)
+    np.testing.assert_allclose(found.wrench, plate.wrench[:100])
+    assert found.usable.all()

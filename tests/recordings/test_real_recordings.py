@@ -14,7 +14,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d import open_c3d
 from bsip_cli.recordings.c3d_content import read_content
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plate_wrench import wrench_at_marker_rate
+from bsip_cli.recordings.plate_wrench import plates_at_marker_rate
 from bsip_cli.recordings.plates import CHANNELS_OF
 from bsip_cli.recordings.read import open_recording, read_recording
 from bsip_cli.recordings.session_findings import findings_about
@@ -108,14 +108,15 @@ def _check_shapes(recording: Recording) -> None:
     assert np.linalg.det(recording.rotation_world_lab) == pytest.approx(1.0)
     for plate in recording.plates:
         assert plate.force_N.shape == plate.moment_Nm.shape == (len(plate.usable), 3)
-        assert np.isfinite(plate.wrench()[plate.usable]).all()
+        assert np.isfinite(plate.wrench[plate.usable]).all()
 
 
 @pytest.mark.parametrize("name", STATIC_KG)
 def test_standing_mass(real_data, name):
-    wrench = wrench_at_marker_rate(_read(real_data / name))
-    assert wrench.usable.mean() > 0.95
-    mass_kg = np.mean(wrench.total[wrench.usable, 2]) / GRAVITY
+    plates = plates_at_marker_rate(_read(real_data / name))
+    usable = np.all([plate.usable for plate in plates], axis=0)
+    assert usable.mean() > 0.95
+    mass_kg = np.mean(sum(plate.lift_N for plate in plates)[usable]) / GRAVITY
     assert mass_kg == pytest.approx(STATIC_KG[name], abs=0.06)
 
 
@@ -232,7 +233,7 @@ def test_duplicates_of_motion_analysis_get_their_names(real_data):
 
 def test_squat_moves_as_the_force_says(real_data):
     recording = _read(real_data / "opencap_subject4/squats1.trc")
-    force = wrench_at_marker_rate(recording).total[:, 2]
+    force = sum(plate.lift_N for plate in plates_at_marker_rate(recording))
     height = np.convolve(recording.markers_m[..., 2].mean(axis=1), np.ones(15) / 15, "same")
     acceleration = np.gradient(np.gradient(height)) * recording.marker_rate_hz**2
     assert np.corrcoef(acceleration[50:-50], force[50:-50])[0, 1] > 0.9

@@ -154,7 +154,7 @@ FAULTS = {
 
 
 def _wrench(recording) -> np.ndarray:
-    return np.array([plate.wrench() for plate in recording.plates])
+    return np.array([plate.wrench for plate in recording.plates])
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -400,7 +400,7 @@ def test_a_reading_is_a_matrix(make, moved):
             if reading.about == "fixed":
                 reading = ForceOnPoint.with_centre([source], reading)
             read = replace(reading, sign=-1)
-            expected = source.plate(read).wrench()
+            expected = source.plate(read).wrench
             found = source.parts() @ source.matrix(read).T
             np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
@@ -411,8 +411,8 @@ def test_a_mirrored_c3d_mirrors_its_channels_or_its_corners(corners_only):
     sources = opened(of_c3d())
     scene = FrameChange("all", 1, corners_only=corners_only)
     twice = sources.in_frame(scene).in_frame(scene)
-    sound = [source.plate(PlateReading()).wrench() for source in sources.sources]
-    again = [source.plate(PlateReading()).wrench() for source in twice.sources]
+    sound = [source.plate(PlateReading()).wrench for source in sources.sources]
+    again = [source.plate(PlateReading()).wrench for source in twice.sources]
     np.testing.assert_allclose(again, sound, atol=1e-9)
     once = [source.plate(PlateReading()) for source in sources.in_frame(scene).sources]
     mirrored_force = np.array(sound)[..., :3] * [1.0, -1.0, 1.0]

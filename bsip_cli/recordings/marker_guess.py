@@ -367,7 +367,8 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _EMPTY = '{ LABEL = "landmark" }'
 _HEAD = """\
 # A marker set, made from the labels of {source}.
-# It was guessed from the labels alone: check it, and correct it before you trust a number.
+# It was guessed from the labels alone: check it, and correct it before you trust a number, and then
+# its description, which the report shows.
 # One line per segment: LABEL = "landmark"; an empty landmark only tracks its segment.
 # Then name this file in study.toml: marker_set = "{name}"
 #
@@ -410,7 +411,7 @@ def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, nam
         source=source,
         name=name,
         landmarks="\n".join(_wrapped(sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}))),
-        description=_quoted(f"Made from the labels of {source}"),
+        description=_quoted(f"Guessed from the labels of {source}, not checked"),
     )
     aliases = [(m.label, [a for a in m.aliases if a.isprintable()]) for m in markers if m.aliases]
     tail = _TAIL.format(

@@ -10,10 +10,11 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, say
-from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import METHODS, OM, RM, SAME_WITHIN
+from bsip_cli.report.words import COMPONENTS, count, listing, number, say
+from bsip_cli.statistics.choice import Difference, between
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published import load_paper
+from bsip_cli.statistics.samples import Z95
 
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
@@ -75,49 +76,52 @@ def one_number_alone(quantity: str, rm_mass: float, om: float) -> str:
 
 
 def use_sentence(
-    choice: pd.DataFrame | None,
-    identification: pd.DataFrame,
-    waits: str = "",
-    is_known: bool = False,
+    choice: pd.DataFrame | None, identification: pd.DataFrame, lead: str = "Use"
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names. ``waits``: what is to be done first; ``is_known``: what the method
-    is has been said."""
-    full, brief = (TEXTS[name] for name in ("methods_in_full", "methods"))
-    if is_known:
-        full = brief = {method: method for method in METHODS}
-    use = f"{waits} Then use" if waits else "Use"
+    the artifacts of these names."""
     if choice is None or choice.empty:
-        return f"{use} {full[RM]}: nothing was compared."
-    first = choice.iloc[0]
+        return f"{lead} {RM}: nothing was compared."
+    first = _of_its_movements(choice)
     others = [
-        f"{brief[method]} for {listing(list(rows['movement']))}"
-        + ("" if is_known else f", where OM is {'' if method == OM else 'not '}clearly better")
+        f"{method} for {listing(list(rows['movement']))}"
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    most = full[first["use"]]
-    if others:
-        most = brief[first["use"]]
-        most = f"else {most}" if is_known else f"{most} for all other movements"
+    most = f"{'else ' if others else ''}{first['use']}"
+    for row in identification[identification["method"] == first["use"]].itertuples():
+        if row.method == RM_MASS:
+            error = number(Z95 * row.mass_factor_sd, 2)
+            most += f" (the table times {number(row.mass_factor, 3)} ± {error})"
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
-    compared = _compared(first, together=bool(others), is_rare=OM in rare)
-    said = f"{use} {(', ' if is_known else ', and ').join([*others, most])}{compared}."
+    is_of_none = bool(others) and first["movement"] == choice.iloc[0]["movement"]
+    compared = _compared(first, is_of_none, is_rare=OM in rare)
+    said = f"{lead} {', '.join([*others, most])}{compared}."
     why = "what is wrong in the recordings gave it a body that fewer than 1 in 100 people have"
     return " ".join([said, *(f"Do not use {method}: {why}." for method in rare)])
 
 
+def _of_its_movements(choice: pd.DataFrame) -> pd.Series:
+    """What speaks for the method to use mostly: of the movements alone in which it is to be used, if
+    there are some; else of all together."""
+    first, own = choice.iloc[0], choice.iloc[1:].query("use == @choice.use.iloc[0]")
+    if len(own) < 2:
+        return own.iloc[0] if len(own) else first
+    logs = {x: between(np.log(own[f"ratio_{x}"])) for x in _PAIRS}
+    known = {f"ratio_{x}": one.ratio for x, one in logs.items()}
+    known |= {f"log_error_{x}": one.error for x, one in logs.items()}
+    return pd.Series({**own.iloc[0], **known, "trials": own["trials"].sum()})
+
+
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
     """What the choice rests on, to go on with after the method's name; ``together``: over movements
-    of which some ask for another method; ``is_rare``: OM is ruled out by its body."""
+    of which all ask for another method; ``is_rare``: OM is ruled out by its body."""
     changes = {x: _change(first[f"ratio_{x}"], first[f"log_error_{x}"]) for x in _PAIRS}
     known = bool(np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all())
-    n = int(first["trials"])
-    every = "all " if together and n > 1 else ""
-    others = "both other recordings" if every and n == 2 else every + count(n, "other recording")
+    n, all_together = int(first["trials"]), "together " if together else ""
     where = {
-        "whole_trials": f"in {others} ",
-        "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
+        "whole_trials": f"in {count(n, 'other recording')} {all_together}",
+        "held_out": f"in seconds of {count(n, 'recording')} that were held out {all_together}",
     }.get(str(first["data"]), "")
     methods = {"use": first["use"], "together": together, "is_rare": is_rare}
     return say("compared", known=known, where=where, **methods, **changes)
@@ -143,7 +147,7 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = (
-    "RMS, measured less computed: good to the first mark (Hansen 2017), bad from the second "
+    "RMS{over}, measured less computed: good to the first mark (Hansen 2017), bad from the second "
     "(Hicks 2015; markers: OpenSim)."
 )
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
@@ -221,17 +225,19 @@ def _published(variable: str) -> float:
     return float(np.median([row.cells[OM].mean for row in rows if OM in row.cells]))
 
 
-def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
-    """Errors over trials, from rows of one method of each one's table ``fit``: the root mean square
-    of those with held-out data, or of all where there are none; NaN where nothing is known."""
+def errors_of(fits: Mapping[str, pd.DataFrame]) -> tuple[dict[str, float], list[str]]:
+    """Errors over trials, from rows of one method of each one's table ``fit``, and over which: the
+    root mean square of those with held-out data, or of all where there are none; NaN where nothing
+    is known."""
     rows = []
-    for fit in fits:
+    for fit in fits.values():
         of = fit.set_index("component")
         rms, percent = of["rmse"].to_dict(), of["rmse_percent_bw"].to_dict()
         cop = float(np.hypot(rms.get("cop_ap", np.nan), rms.get("cop_ml", np.nan)))
         held_out = bool((of["data"] == "held_out").any())
         rows.append((cop, float(percent.get("grf_vertical", np.nan)), held_out))
-    table = pd.DataFrame(rows, columns=[COP, FORCE, "held_out"], dtype=float)
+    table = pd.DataFrame(rows, [*fits], [COP, FORCE, "held_out"], dtype=float)
     known = table[table[[COP, FORCE]].notna().any(axis=1)]
     chosen = known[known["held_out"] > 0] if known["held_out"].any() else known
-    return {name: float(np.sqrt((chosen[name] ** 2).mean())) for name in (COP, FORCE)}
+    sizes = {name: float(np.sqrt((chosen[name] ** 2).mean())) for name in (COP, FORCE)}
+    return sizes, [*chosen.index]

@@ -12,7 +12,16 @@ from bsip_cli.report.causes import Candidate, effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, curves
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import EXTENDED, TEXTS, count, number, say, segment_label, signed
+from bsip_cli.report.words import (
+    EXTENDED,
+    TEXTS,
+    count,
+    listing,
+    number,
+    say,
+    segment_label,
+    signed,
+)
 from bsip_cli.statistics.methods import OM, RM, is_extended
 from bsip_cli.statistics.samples import Z95
 
@@ -22,8 +31,8 @@ _ARMS = ("shoulder", "elbow")
 _LEAST_FRAMES = 10  # of a curve
 
 
-def joint_blocks(record: ParticipantRecord) -> Iterator[Block]:
-    """Moments of one trial's joints, and the largest changes of all peaks."""
+def joint_blocks(record: ParticipantRecord, use: str) -> Iterator[Block]:
+    """Moments of one trial's joints, and the largest changes of all peaks; ``use``: the method to use."""
     trials = [t for t in record.moving_trials() if t.joint_peaks is not None]
     if not trials:
         yield Paragraph("There are no joint moments: run `bsip joints`.", "note")
@@ -33,7 +42,7 @@ def joint_blocks(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph(f"{TEXTS['no_moments']} {_left_out(trials[0])}", "warning")
         return
     yield Paragraph(TEXTS["net_moments"])
-    yield _picture(trial, joints, record.use())
+    yield _picture(trial, joints, use)
     yield from (Paragraph(f"{said}.") for said in largest_changes(all_peaks(trials)))
     yield _peaks_grid(trial, joints, all_peaks(trials))
     if left := _left_out(trial):
@@ -168,8 +177,10 @@ def moment_change(
     rows = known[known["method"].str.endswith(f"+{one.effect}") & known["trial"].isin(one.trials)]
     if rows.empty:
         return ""
-    if rows["change_percent"].max() < 1.0:
-        return "joint moments change under 1 %"
+    if rows["change_percent"].max() < 1.0:  # of joints that are left out nothing is known
+        kinds = {joint.rpartition("_")[0] for joint in rows["joint"]}
+        shown = [kind for kind in (*_LEGS, *_ARMS) if kind in kinds]
+        return f"{listing(shown)} moments change under 1 %"
     most = rows.iloc[0]
     percent = number(most["change_percent"], 0 if most["change_percent"] >= 1.0 else 1)
     return f"changes the {segment_label(most['joint'])}'s moment by {percent} % of its peak"

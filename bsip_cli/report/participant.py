@@ -41,7 +41,7 @@ from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, curves, error_bars, marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.joints import joint_blocks
-from bsip_cli.report.recordings import large_finding, uses_of
+from bsip_cli.report.recordings import large_finding, use_now, use_said, uses_of
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -74,7 +74,7 @@ def participant_document(record: ParticipantRecord) -> Document:
     sections = {
         (verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?"): _diagnosis(record),
         ("errors", "How large are the errors, when, and what makes them?"): errors_of_forces,
-        ("joints", "What does it change at the joints?"): joint_blocks(record),
+        ("joints", "What does it change at the joints?"): joint_blocks(record, use_now(record)),
         ("parameters", "Which segment parameters come out?"): parameters,
         ("recording", "What was recorded?"): _recording(record),
         ("made", "How was it made, and what can it not know?"): (*cannot, *how_made),
@@ -114,12 +114,16 @@ def _diagnosis(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
-    """The causes that came nearest to being found."""
-    rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
+    """The causes that came nearest to being found, each once, and none that was found elsewhere."""
+    found = {one.label for one in candidates if one.verdict != "rejected"}
+    rejected: dict[str, Candidate] = {}
+    for one in candidates:
+        if one.label not in found:
+            rejected.setdefault(one.label, one)
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
     rows = []
-    for one in rejected:
+    for one in list(rejected.values())[:_NEAREST]:
         sure = probability_words(one.probability) or MISSING
         rows.append((one.label, sure, number(one.rms_change, 1), one.removes()))
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
@@ -291,7 +295,7 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
     choice = record.choice
     if choice is None or choice.empty:
         return
-    yield Paragraph(str(choice["sentence"].iloc[0]))
+    yield Paragraph(use_said(record))
     for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
         why = f"a body like this is rarer than 1 in 100 people, most by {row.farthest}"
         yield Paragraph(f"Do not use {row.method}: {why}.", "warning")
@@ -386,14 +390,14 @@ def _recording(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph(TEXTS["loads"].format(carried=carried))
     if lines := _findings(record):
         yield Heading("Repaired, left out, warned of")
-        yield from first_of(lines, _MOST_FINDINGS, "the recordings' quality artifacts")
+        yield first_of(lines, _MOST_FINDINGS, "recording_warnings")
     else:
         yield Paragraph("Nothing was repaired, excluded or warned of.")
     yield from _markers(record)
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
     lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
     if lines:
-        yield from first_of(lines, _MOST_EVENTS, "the trials' marker-events")
+        yield first_of(lines, _MOST_EVENTS, "marker_events")
     elif known:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
 
@@ -412,7 +416,8 @@ def _trials(record: ParticipantRecord) -> Grid:
                 percent(float(frame["determined"].astype(float).mean())),
                 number(trial.markers_mm()),
             )
-        rows.append((trial.label, ROLES[trial.role], uses[trial.stem].in_words(), *numbers))
+        roles = listing([ROLES[one] for one in record.roles_of(trial)], MISSING)
+        rows.append((trial.label, roles, uses[trial.stem].in_words(), *numbers))
     head = ("recording", "role", "use", "duration [s]", "forces compared [%]", "pose known [%]")
     return Grid((*head, "markers [mm]"), tuple(rows), _CAPTIONS["trials"], words=3)
 

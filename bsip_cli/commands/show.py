@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shutil import get_terminal_size
@@ -18,12 +18,11 @@ from bsip_cli.report.budget import BEFORE, numbered_pieces
 from bsip_cli.report.causes import analysed, candidates_of, causes_of, effects_in
 from bsip_cli.report.cohort import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort_record import SHARED, Searched, searched, shared_causes
-from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.joints import largest_changes, moment_change, peaks_of
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, cause_line, corrected_sentence, light_of, verdict_of
-from bsip_cli.report.words import TEXTS, count, listing
+from bsip_cli.report.words import count, listing
 from bsip_cli.running.runner import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
@@ -117,13 +116,10 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
     page = _of_the_page(folder)
     found = verdict_of(diagnosis, detection, gains, changes, budget, page.get("large", ()))
     right = corrected_sentence(_of_trials(folder, "marker-events"))
-    headline = found.headline
-    if page:
-        headline = "{title}. {text}".format(**page["light"])
+    headline = "{title}. {text}".format(**page["light"]) if page else found.headline
     peaks = peaks_of(_of_trials(folder, "joint-peaks"))
-    more = [f"{said}." for said in largest_changes(peaks)]
-    results = (*found.results, *more, _use_of(folder, page))
-    found = replace(found, headline=headline, results=results)
+    more = *(f"{said}." for said in largest_changes(peaks)), page.get("said", "")
+    found = replace(found, headline=headline, results=(*found.results, *more))
     return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
 
@@ -151,9 +147,9 @@ def _findings(
     found = {k: effects_in([c]) for k, c in enumerate(causes, start=1 + len(large))}
     if budget is not None and (pieces := numbered_pieces(budget, found)):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
-        yield _wrapped(f"The {BEFORE} (RM): {parts}.", "  - ")
-    if said := _use_of(folder, page):
-        yield _wrapped(said, "  - ")
+        yield _wrapped(f"The {BEFORE}: {parts}.", "  - ")
+    if page:
+        yield _wrapped(page["said"], "  - ")
 
 
 def _of_the_page(folder: Path) -> dict[str, Any]:
@@ -164,14 +160,6 @@ def _of_the_page(folder: Path) -> dict[str, Any]:
         return {}
     facts: dict[str, Any] = read_header(page, "report-files")["provenance"]["facts"]
     return facts
-
-
-def _use_of(folder: Path, page: Mapping[str, Any]) -> str:
-    """As the report's page says; without one, by errors alone."""
-    choice, identified = (_table(folder, kind) for kind in ("choice", "identification"))
-    if page or choice is None or identified is None:
-        return str(page.get("said", ""))
-    return use_sentence(choice, identified, TEXTS["so_far"])
 
 
 def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:

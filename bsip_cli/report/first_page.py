@@ -252,7 +252,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     first, other = recordings.measured_of(record), recordings.measured_of(record, RM)
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if recordings.om_waits(record):
-        other, which = recordings.measured_of(record, OM), f"? ● {used}, ○ {OM} (not yet)"
+        other, which = recordings.measured_of(record, OM), f"? ● {used}{later}, ○ {OM} (not yet)"
     scales = [
         (one, size, None if one.shown(other[one]) == one.shown(size) else other[one])
         for one, size in first.items()

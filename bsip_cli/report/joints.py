@@ -31,8 +31,8 @@ _ARMS = ("shoulder", "elbow")
 _LEAST_FRAMES = 10  # of a curve
 
 
-def joint_blocks(record: ParticipantRecord, use: str) -> Iterator[Block]:
-    """Moments of one trial's joints, and the largest changes of all peaks; ``use``: the method to use."""
+def joint_blocks(record: ParticipantRecord) -> Iterator[Block]:
+    """Moments of one trial's joints, and the largest changes of all peaks."""
     trials = [t for t in record.moving_trials() if t.joint_peaks is not None]
     if not trials:
         yield Paragraph("There are no joint moments: run `bsip joints`.", "note")
@@ -42,7 +42,7 @@ def joint_blocks(record: ParticipantRecord, use: str) -> Iterator[Block]:
         yield Paragraph(f"{TEXTS['no_moments']} {_left_out(trials[0])}", "warning")
         return
     yield Paragraph(TEXTS["net_moments"])
-    yield _picture(trial, joints, use)
+    yield _picture(trial, joints)
     yield from (Paragraph(f"{said}.") for said in largest_changes(all_peaks(trials)))
     yield _peaks_grid(trial, joints, all_peaks(trials))
     if left := _left_out(trial):
@@ -72,7 +72,7 @@ def _chosen(trials: Sequence[TrialRecord]) -> tuple[TrialRecord, tuple[str, ...]
     return trials[0], ()
 
 
-def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
+def _picture(trial: TrialRecord, joints: Sequence[str]) -> Picture:
     """Of each joint's first axis, flexion or extension."""
     moments = trial.joint_moments
     assert moments is not None
@@ -97,7 +97,7 @@ def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
         panels.append(Panel(title, of[methods[0]]["time_s"].to_numpy(), named, spreads))
     columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
     figure = curves(panels, 2, 32.0)
-    return picture("joint_moments", figure, data[columns], trial=trial.label, use=use)
+    return picture("joint_moments", figure, data[columns], trial=trial.label)
 
 
 def _peaks_grid(trial: TrialRecord, joints: Sequence[str], every: pd.DataFrame) -> Grid:

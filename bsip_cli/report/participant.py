@@ -28,6 +28,7 @@ from bsip_cli.report.causes import (
     USUAL,
     Candidate,
     Limit,
+    analysed,
     candidates_of,
     effect_title,
     effects_in,
@@ -41,7 +42,7 @@ from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, curves, error_bars, marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.joints import joint_blocks
-from bsip_cli.report.recordings import large_finding, use_now, use_said, uses_of
+from bsip_cli.report.recordings import large_finding, use_said, uses_of
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -74,7 +75,7 @@ def participant_document(record: ParticipantRecord) -> Document:
     sections = {
         (verdict.ALL_FAULTS, "Is anything wrong, and how sure is that?"): _diagnosis(record),
         ("errors", "How large are the errors, when, and what makes them?"): errors_of_forces,
-        ("joints", "What does it change at the joints?"): joint_blocks(record, use_now(record)),
+        ("joints", "What does it change at the joints?"): joint_blocks(record),
         ("parameters", "Which segment parameters come out?"): parameters,
         ("recording", "What was recorded?"): _recording(record),
         ("made", "How was it made, and what can it not know?"): (*cannot, *how_made),
@@ -104,6 +105,9 @@ def _diagnosis(record: ParticipantRecord) -> Iterator[Block]:
     events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
     yield Numbered(said.causes) if said.causes else Paragraph(said.headline)
     yield from map(Paragraph, (*verdict.corrected_sentence(events), *said.results))
+    searched = analysed(record.detection, record.diagnosis)
+    if left := [trial.label for trial in record.trials if trial.stem not in searched]:
+        yield Paragraph(TEXTS["not_analysed"].format(trials=listing(left)))
     yield from [Heading("What to do"), Bullets(said.advice)] if said.advice else []
     yield from nearest(candidates_of(record.diagnosis))
     yield Heading("What might have gone unseen")
@@ -310,7 +314,7 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
             ends = f" ({low} to {high})" if low != MISSING else ""
             ratios.append(f"{number(ratio, 2)}{ends}")
         rows.append((one["movement"], one["use"], *ratios, str(one["trials"])))
-    head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
+    head = ("movement", "best", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
     yield Grid(head, tuple(rows), _CAPTIONS["choice"], words=2)
 
 

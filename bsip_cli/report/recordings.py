@@ -71,7 +71,8 @@ def _sizes(
 def judging(record: ParticipantRecord) -> str:
     """Over which recordings the forces' errors of all together are, usable or not."""
     stems = errors_of(_fits(record, record.moving_trials()))[1]
-    return f" over {_listed(stems, record)}" if stems else ""
+    many = f"{len(stems)} recordings" if len(stems) > _MOST_RUNS else _listed(stems, record)
+    return f" over {many}" if stems else ""
 
 
 def measured_of(record: ParticipantRecord, method: str = "") -> dict[Yardstick, float]:
@@ -268,17 +269,22 @@ def _listed(stems: Sequence[str], record: ParticipantRecord) -> str:
     return listing(items)
 
 
-def must_wait(record: ParticipantRecord) -> str:
-    """Why the parameters should not be used yet, and what to do: the calibration is bad, or not all
-    recordings that identified OM may be used themselves, or errors are large and no recording may;
-    else empty."""
+def _before_any(record: ParticipantRecord) -> str:
+    """What has to be done before any parameters are used: the calibration is bad, or errors are large
+    and no recording may be used; else empty."""
     kinds = {use.kind for use in uses_of(record).values()}
-    if own := om_waits(record):
-        return TEXTS["usable"]["identified"].format(trials=listing(own))
     if "calibration" in kinds:
-        return TEXTS["usable"]["calibration"]
+        return str(TEXTS["usable"]["calibration"])
     is_large = light_for(record).state == "large"
     return TEXTS["usable"]["large"] if is_large and kinds.isdisjoint(_USABLE) else ""
+
+
+def must_wait(record: ParticipantRecord) -> str:
+    """The same, or why OM should not be used yet: not all recordings that identified it may be used
+    themselves."""
+    trials = listing(om_waits(record), "")
+    later = TEXTS["usable"]["identified"].format(trials=trials) if trials else ""
+    return _before_any(record) or later
 
 
 @_once
@@ -312,7 +318,7 @@ def use_words(record: ParticipantRecord) -> str:
 
 def not_yet(record: ParticipantRecord) -> str:
     """After the parameters to use, where something has to be done before any are."""
-    return " (not yet)" if must_wait(record) and not om_waits(record) else ""
+    return " (not yet)" if _before_any(record) else ""
 
 
 def use_said(record: ParticipantRecord, brief: bool = False) -> str:

@@ -132,6 +132,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
+    assert "RMS over basketball, measured less computed" in first  # what OM had not seen
     corrected = "sequence (finding 1); basketball (findings 1 and"
     assert f"Use after acting on the finding: {corrected}" in first
     assert (
@@ -305,7 +306,7 @@ def test_rm_is_used_where_nothing_is_sure(record):
     assert "Do not use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)
     said = use_sentence(alone, rare)
-    assert ": no recording is left to judge OM by. " in said and "Do not use OM" in said
+    assert "or no recording is left to judge it by. " in said and "Do not use OM" in said
 
 
 # --- sections -----------------------------------------------------------------------------------
@@ -329,8 +330,11 @@ def test_joint_moments_are_told_with_what_changes_them(record, text):
     changed = f"left knee extension most, by {number(largest['OM'], 1)} N m".replace(
         "by 8", "by +8"
     )
-    assert f"Identification (OM against RM) changes {changed}, 10 % of that joint's peak." in text
-    assert "The force plate turned or tilted changes left knee extension most" in text
+    assert (
+        f"as far as known: identification (OM against RM) changes {changed}, 10 % of that joint's "
+        "peak." in text
+    )
+    assert "known: the force plate turned or tilted changes left knee extension most" in text
     assert re.search(r"Left out of \w+ \(run 1\): both feet are on one plate: 3 frames\.", text)
 
 
@@ -342,12 +346,12 @@ def test_arms_are_shown_where_no_leg_is_known(record):
         replace(t, joint_moments=armed(t.joint_moments), joint_peaks=armed(t.joint_peaks))
         for t in record.trials[1:]
     )
-    section = tuple(joint_blocks(replace(record, trials=trials), "OM"))
+    section = tuple(joint_blocks(replace(record, trials=trials)))
     (picture,) = [block for block in section if isinstance(block, Picture)]
     assert set(picture.data["joint"]) == {"elbow_r"}
     assert set(picture.data["method"]) == {"RM", "OM", "OM+plate_rotation"}
     bare = tuple(replace(t, joint_moments=None, joint_peaks=None) for t in record.trials)
-    (said,) = joint_blocks(replace(record, trials=bare), "OM")
+    (said,) = joint_blocks(replace(record, trials=bare))
     assert "bsip joints" in said.text
 
 

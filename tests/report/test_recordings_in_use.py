@@ -24,6 +24,7 @@ from bsip_cli.report.recordings import (
     main_part,
     measured_of,
     must_wait,
+    not_yet,
     number_of_main_part,
     om_waits,
     use_lines,
@@ -263,7 +264,10 @@ def test_parameters_wait_for_the_recordings_that_they_are_from(record):
     for stem in TRIALS:
         far = with_error(far, stem, rmse_percent_bw=9.0)
     assert light_for(far).state == "large" and not must_wait(far)
-    assert must_wait(with_error(far, STATIC, rmse_percent_bw=9.0))
+    nowhere = with_error(far, STATIC, rmse_percent_bw=9.0)
+    assert must_wait(nowhere) == "First solve the large error." and not_yet(nowhere)
+    om = replace(nowhere, choice=record.choice)  # which comes from one of them
+    assert om_waits(om) and must_wait(om) == must_wait(nowhere) and use_words(om) == "RM"
 
 
 def test_elsewhere_found_is_no_explanation(record):

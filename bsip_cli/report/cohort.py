@@ -391,10 +391,6 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         rows.append((label, *changes, *map(str, counts)))
     said = TEXTS["om_worse"].format(components=listing(worse)) if worse else TEXTS["om_better"]
     yield Paragraph(said, "warning" if worse else "good")
-    if (name := "grf_vertical") in names:
-        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
-        if np.isfinite(rm_mass):
-            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om))
     others = [method for method in METHODS if method != RM]
     of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
     where = "held-out data" if ratios.held_out else "the data that identified the parameters"

@@ -12,7 +12,7 @@ import pandas as pd
 
 from bsip_cli.report.words import COMPONENTS, count, listing, number, say
 from bsip_cli.statistics.choice import Difference, between
-from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS
 from bsip_cli.statistics.published import load_paper
 from bsip_cli.statistics.samples import Z95
 
@@ -22,13 +22,12 @@ _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 @dataclass(frozen=True)
 class Gain:
     """Errors (RMSE) of the methods in one component of one trial: of OM, RM, and RM+mass if there.
-    frames : that they rest on. held_out : OM had not seen the data."""
+    held_out : OM had not seen the data."""
 
     component: str
     unit: str
     of: Mapping[str, float]
     trial: str
-    frames: int
     held_out: bool
 
 
@@ -44,32 +43,9 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
             column, unit = "rmse_percent_bw", "% BW"
         errors = {method: float(row[column]) for method, row in known.items()}
-        frames = min(int(row["n"]) for row in known.values())
         held_out = known[OM]["data"] == "held_out"
-        gains.append(Gain(component, unit, errors, trial, frames, held_out))
+        gains.append(Gain(component, unit, errors, trial, held_out))
     return tuple(gains)
-
-
-def pooled_errors(gains: Iterable[Gain], component: str) -> dict[str, float]:
-    """Of the methods in one component, over all frames of the trials, so that a stride of 0.2 s
-    counts for no more than it is; trials without numbers are left out."""
-    mine = [one for one in gains if one.component == component]
-    known = [one for one in mine if np.isfinite(list(one.of.values())).all()]
-    frames = [one.frames for one in known]
-    squares = {
-        method: [one.of[method] ** 2 for one in known]
-        for method in METHODS
-        if known and all(method in one.of for one in known)
-    }
-    return {m: float(np.sqrt(np.average(x, weights=frames))) for m, x in squares.items()}
-
-
-def one_number_alone(quantity: str, rm_mass: float, om: float) -> str:
-    """What one number for the whole mass does without identification, in a sentence; ``rm_mass`` and
-    ``om``: relative change of RM's error by these methods, -0.4 is 40 % less."""
-    over_rm_mass = (1.0 + om) / (1.0 + rm_mass) - 1.0 if rm_mass > -1.0 else np.nan
-    known = {"quantity": quantity, "rm_mass": rm_mass, "om": om, "over": over_rm_mass}
-    return say("one_number", same=SAME_WITHIN, **known)
 
 
 # --- which parameters ---------------------------------------------------------------------------
@@ -147,8 +123,8 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = (
-    "RMS{over}, measured less computed: good to the first mark (Hansen 2017), bad from the second "
-    "(Hicks 2015; markers: OpenSim)."
+    "RMS of what OM had not seen, usable or not: good to the first mark (Hansen 2017), bad from the "
+    "second (Hicks 2015; markers: OpenSim)."
 )
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, MARKER_LIMIT_MM = 10.0, 20.0
@@ -225,19 +201,17 @@ def _published(variable: str) -> float:
     return float(np.median([row.cells[OM].mean for row in rows if OM in row.cells]))
 
 
-def errors_of(fits: Mapping[str, pd.DataFrame]) -> tuple[dict[str, float], list[str]]:
-    """Errors over trials, from rows of one method of each one's table ``fit``, and over which: the
-    root mean square of those with held-out data, or of all where there are none; NaN where nothing
-    is known."""
+def errors_of(fits: Iterable[pd.DataFrame]) -> dict[str, float]:
+    """Errors over trials, from rows of one method of each one's table ``fit``: the root mean square
+    of those with held-out data, or of all where there are none; NaN where nothing is known."""
     rows = []
-    for fit in fits.values():
+    for fit in fits:
         of = fit.set_index("component")
         rms, percent = of["rmse"].to_dict(), of["rmse_percent_bw"].to_dict()
         cop = float(np.hypot(rms.get("cop_ap", np.nan), rms.get("cop_ml", np.nan)))
         held_out = bool((of["data"] == "held_out").any())
         rows.append((cop, float(percent.get("grf_vertical", np.nan)), held_out))
-    table = pd.DataFrame(rows, [*fits], [COP, FORCE, "held_out"], dtype=float)
+    table = pd.DataFrame(rows, columns=[COP, FORCE, "held_out"], dtype=float)
     known = table[table[[COP, FORCE]].notna().any(axis=1)]
     chosen = known[known["held_out"] > 0] if known["held_out"].any() else known
-    sizes = {name: float(np.sqrt((chosen[name] ** 2).mean())) for name in (COP, FORCE)}
-    return sizes, [*chosen.index]
+    return {name: float(np.sqrt((chosen[name] ** 2).mean())) for name in (COP, FORCE)}

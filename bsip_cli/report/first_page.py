@@ -259,8 +259,7 @@ def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
     ]
     yield blocks.Heading(f"How large are the errors{which}")
     yield blocks.Scales(tuple(scales))
-    over = recordings.judging(record)
-    yield blocks.Paragraph(errors.SOURCES.format(over=over), "note")
+    yield blocks.Paragraph(errors.SOURCES, "note")
     yield from budget_bar(record)
 
 

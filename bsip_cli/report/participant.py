@@ -256,15 +256,8 @@ def _errors(record: ParticipantRecord) -> Iterator[Block]:
     if not by_trial:
         yield Paragraph("No recording could be compared with both methods.", "warning")
         return
-    held_out = [gain for gain in gains if gain.held_out]
-    if not held_out:
+    if not any(gain.held_out for gain in gains):
         yield Paragraph(TEXTS["nothing_held_out"], "warning")
-    factor = record.identification.query("method == @RM_MASS")["mass_factor"]
-    of = errors.pooled_errors(held_out or gains, "grf_vertical")
-    if len(factor) and RM_MASS in of:
-        changes = (of[m] / of[RM] - 1.0 if of[RM] > 0.0 else np.nan for m in (RM_MASS, OM))
-        said = errors.one_number_alone(component_label("grf_vertical"), *changes)
-        yield Paragraph(f"{said} RM+mass is {RM} times {number(factor.iloc[0], 3)}.")
     rows: list[tuple[str | Cell, ...]] = []
     for trial, gain_of in by_trial.items():
         used = "" if next(iter(gain_of.values())).held_out else " (identified OM)"
@@ -300,9 +293,6 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
     if choice is None or choice.empty:
         return
     yield Paragraph(use_said(record))
-    for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
-        why = f"a body like this is rarer than 1 in 100 people, most by {row.farthest}"
-        yield Paragraph(f"Do not use {row.method}: {why}.", "warning")
     if not choice["trials"].iloc[0]:
         return
     rows = []

@@ -48,31 +48,19 @@ _once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 # --- how large ----------------------------------------------------------------------------------
 
 
-def _fits(
-    record: ParticipantRecord, trials: Sequence[TrialRecord], method: str = ""
-) -> dict[str, pd.DataFrame]:
-    """By stem, the errors of a method, or of the one to use now."""
-    return {
-        trial.stem: trial.fit[trial.fit["method"] == (method or use_now(record, trial.task))]
-        for trial in trials
-        if trial.fit is not None
-    }
-
-
 def _sizes(
     record: ParticipantRecord, trials: Sequence[TrialRecord], markers_mm: float, method: str = ""
 ) -> dict[Yardstick, float]:
-    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials."""
+    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials; by a
+    method, or by the one to use now."""
     limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
-    values = errors_of(_fits(record, trials, method))[0] | {MARKERS: markers_mm}
+    fits = [
+        trial.fit[trial.fit["method"] == (method or use_now(record, trial.task))]
+        for trial in trials
+        if trial.fit is not None
+    ]
+    values = errors_of(fits) | {MARKERS: markers_mm}
     return {one: values[one.name] for one in yardsticks(*limits)}
-
-
-def judging(record: ParticipantRecord) -> str:
-    """Over which recordings the forces' errors of all together are, usable or not."""
-    stems = errors_of(_fits(record, record.moving_trials()))[1]
-    many = f"{len(stems)} recordings" if len(stems) > _MOST_RUNS else _listed(stems, record)
-    return f" over {many}" if stems else ""
 
 
 def measured_of(record: ParticipantRecord, method: str = "") -> dict[Yardstick, float]:

@@ -132,7 +132,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
-    assert "RMS over basketball, measured less computed" in first  # what OM had not seen
+    assert "RMS of what OM had not seen, usable or not: good to" in first
     corrected = "sequence (finding 1); basketball (findings 1 and"
     assert f"Use after acting on the finding: {corrected}" in first
     assert (

@@ -123,10 +123,8 @@ def test_on_a_bad_calibration_all_else_rests(record):
     kinematics = record.trials[0].kinematics.assign(marker_rms_m=0.0235)
     bad = with_trial(with_faults(record), STATIC, kinematics=kinematics)
     assert record.facts["calibration_trial"] == STATIC and kinds_of(bad)[0] == "calibration"
-    assert next(use_lines(bad)) == (
-        "First repeat or correct the calibration, on which all else rests: static "
-        "(marker error 23.5 mm)."
-    )
+    said = "Bad calibration, on which all else rests: static (marker error 23.5 mm)."
+    assert next(use_lines(bad)) == said
     assert steps(bad)[0].startswith("First repeat static, or correct its markers, farthest off ")
     assert must_wait(bad) == use_said(bad, brief=True) == "First repeat or correct the calibration."
     facts = record.facts.copy()

@@ -28,6 +28,8 @@ from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import READERS
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import SIDES
+from bsip_cli.report.errors import use_sentence
+from bsip_cli.report.words import TEXTS
 from bsip_cli.running.runner import Outcome, attempt, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
@@ -289,7 +291,8 @@ def _export(
 
 
 def _chosen(unit: Unit) -> tuple[str, str]:
-    """The method that `bsip choose` found best over all movements, and why."""
+    """The method to use, as the report's page says, and why; without a page, the one that
+    `bsip choose` found best over all movements."""
     path = unit.path("choice")
     if not path.exists() or not is_made_from(path, unit.path("identification")):
         raise UsageError(
@@ -298,8 +301,12 @@ def _chosen(unit: Unit) -> tuple[str, str]:
             expected="the result of `bsip choose`",
             remedy="run `bsip choose` or `bsip run`, or name a method with --method",
         )
-    first = unit.read("choice").iloc[0]
-    return str(first["use"]), str(first["sentence"])
+    page, choice = unit.path("report-files"), unit.read("choice")
+    if page.exists() and is_made_from(page, path):
+        facts = unit.facts("report-files")
+        return str(facts["method"]), str(facts["said"])
+    said = use_sentence(choice, unit.read("identification"), TEXTS["so_far"])
+    return str(choice["use"].iloc[0]), said
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:

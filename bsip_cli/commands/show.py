@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import fill
+from typing import Any
 
 import pandas as pd
 
@@ -17,7 +18,6 @@ from bsip_cli.report.budget import BEFORE, numbered_pieces
 from bsip_cli.report.causes import analysed, candidates_of, causes_of, effects_in
 from bsip_cli.report.cohort import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort_record import SHARED, Searched, searched, shared_causes
-from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.joints import largest_changes, moment_change, peaks_of
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -46,7 +46,7 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    choices = list(_notes(out, "choice", "sentence"))
+    choices = any(_path(folder, "choice").exists() for folder in _folders(out))
     stated = list(_notes(out, "person", "mass_note", "height_note"))
     if not tables and not people and not stated and not choices:
         raise UsageError(
@@ -54,8 +54,8 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
-    if notes := [*stated, *(choices if full else ())]:
-        yield "\n".join(notes)
+    if stated:
+        yield "\n".join(stated)
     folders = _folders(out)
     if full and tables and len(list(out.glob("sub-*"))) > 1:  # of one person nothing is tested
         yield "\n".join(map(printable, tables.split("\n")))
@@ -113,13 +113,13 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
         return searched(folder.name, diagnosis, facts), "\n".join(lines)
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
-    light, large, _ = _of_the_page(folder)
-    found = verdict_of(diagnosis, detection, gains, changes, budget, large)
+    page = _of_the_page(folder)
+    found = verdict_of(diagnosis, detection, gains, changes, budget, page.get("large", ()))
     right = corrected_sentence(_of_trials(folder, "marker-events"))
-    headline = f"{light.title}. {light.text}" if light else found.headline
+    headline = "{title}. {text}".format(**page["light"]) if page else found.headline
     peaks = peaks_of(_of_trials(folder, "joint-peaks"))
-    changed = tuple(f"{said}." for said in largest_changes(peaks))
-    found = replace(found, headline=headline, results=(*found.results, *changed))
+    more = *(f"{said}." for said in largest_changes(peaks)), page.get("said", "")
+    found = replace(found, headline=headline, results=(*found.results, *more))
     return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
 
@@ -128,13 +128,13 @@ def _findings(
 ) -> Iterator[str]:
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
     error, which parameters to use. Of one among many the first."""
-    budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
-    light, large, waits = _of_the_page(folder)
-    light = light or light_of(diagnosis, detection, budget)
-    use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
+    budget, page = _table(folder, "overall-error-budget"), _of_the_page(folder)
+    light = Light(**page["light"]) if page else light_of(diagnosis, detection, budget)
+    use = f" Use {page['use']}." if page and not alone else ""
     yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}")
     if not alone:
         return
+    large = page.get("large", ())
     causes = causes_of(candidates_of(diagnosis))
     everywhere = analysed(detection, diagnosis)
     peaks = peaks_of(_of_trials(folder, "joint-peaks"))
@@ -147,21 +147,19 @@ def _findings(
     found = {k: effects_in([c]) for k, c in enumerate(causes, start=1 + len(large))}
     if budget is not None and (pieces := numbered_pieces(budget, found)):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
-        yield _wrapped(f"The {BEFORE} (RM): {parts}.", "  - ")
-    if choice is not None:
-        identified = _table(folder, "identification")
-        assert identified is not None  # it was chosen among what was identified
-        yield _wrapped(use_sentence(choice, identified, waits), "  - ")
+        yield _wrapped(f"The {BEFORE}: {parts}.", "  - ")
+    if page:
+        yield _wrapped(page["said"], "  - ")
 
 
-def _of_the_page(folder: Path) -> tuple[Light | None, tuple[str, ...], str]:
-    """The answer on the report's first page, its finding of a large error if any, and what has to
-    be done before parameters are used; nothing where there is no report of this diagnosis."""
+def _of_the_page(folder: Path) -> dict[str, Any]:
+    """What the report's pages say: the answer (light), its finding of a large error if any, which
+    parameters to use; nothing where there is no report of this diagnosis."""
     page = _path(folder, "report-files")
     if not page.exists() or not is_made_from(page, _path(folder, "overall-diagnosis")):
-        return None, (), ""
-    facts = read_header(page, "report-files")["provenance"]["facts"]
-    return Light(**facts["light"]), tuple(facts.get("large", ())), facts.get("first", "")
+        return {}
+    facts: dict[str, Any] = read_header(page, "report-files")["provenance"]["facts"]
+    return facts
 
 
 def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:

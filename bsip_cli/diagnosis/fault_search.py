@@ -164,10 +164,10 @@ def _verdict(
     unnamed = [x for x in weighed if x.fault.name == UNEXPLAINED]
     for each, share in zip(weighed, np.exp(logs - logsumexp(logs)).tolist(), strict=True):
         name = unnamed[0] if each in unnamed else each  # without a name they are all one
-        shares[name] = shares.get(name, 0.0) + share
-    members = tuple((each, shares[each] * there) for each in smallest(shares, named_from))
+        shares[name] = shares.get(name, 0.0) + share * there
+    members = tuple((each, shares[each]) for each in smallest(shares, named_from))
     rest = sorted(shares, key=lambda x: -shares[x])[len(members) :]
-    hardly = tuple((each.fault, shares[each] * there) for each in rest)
+    hardly = tuple((each.fault, shares[each]) for each in rest)
     return Verdict(number, members, hardly, there), without
 
 

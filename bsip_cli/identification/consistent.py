@@ -338,7 +338,7 @@ def estimate(problem: Problem) -> Estimate:
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
         f"centres of mass lie {centres:.2f} standard deviations among people from the table, "
-        f"inertias {min(tensors):.2f} to {max(tensors):.2f}"
+        f"inertias {' to '.join(dict.fromkeys(f'{x:.2f}' for x in (min(tensors), max(tensors))))}"
     )
     if fit.decided < _LITTLE:
         note += "; too little motion, or errors that hide what it shows"
@@ -347,4 +347,5 @@ def estimate(problem: Problem) -> Estimate:
         shown @ fit.optimum.covariance @ shown.T,
         note,
         prior_covariance=shown @ fit.prior_covariance @ shown.T,
+        decided=fit.decided,
     )

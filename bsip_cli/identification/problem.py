@@ -313,13 +313,14 @@ class Estimate:
     """Parameters (P,) about the joint centres, their covariance (P, P), and a note for people.
 
     ``prior_covariance`` (P, P) where the estimator weighs the prior itself: what the data share is
-    counted from.
+    counted from. ``decided``: how many of the parameters the data decide, where that is known.
     """
 
     phi: np.ndarray
     covariance: np.ndarray
     note: str
     prior_covariance: np.ndarray | None = None
+    decided: float = float("nan")
 
     def residual_rms(self, problem: Problem) -> np.ndarray:
         """(6,) residual [N, N m] that the estimate leaves in its own data."""

@@ -160,6 +160,7 @@ def find_level_change(
 _OFFSET = 3.0  # trusted distances, and spreads of the marker about its median
 _STANDS_OUT = 5.0  # over the median of all markers' median residuals
 _LEAST_SHARE = 0.1  # of the frames show the marker
+_OFTEN = 0.5  # seen in fewer frames, it is said
 _STAYS_S = 0.5  # at the calibrated place before, and at another after
 _IN_PLACE = 0.3  # of the later residual at most, while the marker is in its place
 
@@ -199,11 +200,23 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
             break
         start = _leaves_its_place(residual[:, m], mean[m], round(_STAYS_S / fit.step_s()))
         kind: Kind = "slip" if start else "offset"
-        frames = slice(start, len(residual))
-        events.append(event(fit, kind, m, frames, size, float(_OFFSET * size / limit[m])))
+        frames, surely = slice(start, len(residual)), float(_OFFSET * size / limit[m])
+        note = _remarks(fit, m, size, float(seen[start:, m].mean()))
+        events.append(event(fit, kind, m, frames, size, surely, note=note))
         mean = mean - made
         mean[m] = 0.0
     return events
+
+
+def _remarks(fit: MarkerFit, m: int, size_m: float, share: float) -> str:
+    """Where a marker is seen in a part of the frames only, and where it is farther from its place
+    than the segment's next marker is, which skin does not do."""
+    segments, places = fit.person.marker_segments, fit.person.marker_positions_m
+    others = np.flatnonzero((segments == segments[m]) & (np.arange(len(segments)) != m))
+    apart_m = np.linalg.norm(places[others] - places[m], axis=1)
+    note = f" (seen in {100 * share:.0f} % of it)" if share < _OFTEN else ""
+    is_far = size_m > apart_m.min(initial=np.inf)
+    return note + ("; probably another marker, as the next one is nearer" if is_far else "")
 
 
 def _leaves_its_place(residual: np.ndarray, level: np.ndarray, least: int) -> int:
@@ -301,7 +314,7 @@ def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
     ranked = sorted(groups.items(), key=lambda item: (item[0][0], -max(e.size_m for e in item[1])))
     said = [_of_group(group) for _, group in ranked]
     left = len(said) - most
-    return said if left <= 0 else [*said[:most], f"and {left} more, see marker-events"]
+    return said if left <= 0 else [*said[:most], f"and {left} more, in the report"]
 
 
 def _of_group(group: list[MarkerEvent]) -> str:

@@ -34,7 +34,6 @@ from scipy.ndimage import median_filter
 
 from bsip_cli.motion.marker_events import (
     BEYOND,
-    Kind,
     LevelChange,
     MarkerEvent,
     event,
@@ -271,20 +270,30 @@ def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.n
         search.take(slip, made)
         if np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]:
             found.append(slip)
-    return _events(fit, found), search.left
+    return _events(fit, found, search.frames), search.left
 
 
-def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
-    """Slips; one that a later one undoes is a long jump."""
-    events, waiting = [], sorted(found, key=lambda one: one.frame)
+def _events(fit: MarkerFit, found: list[_Slip], least: int) -> list[MarkerEvent]:
+    """Slips; one that a later one undoes is a long jump, and what is left of a marker within fewer
+    than ``least`` frames is one slip, found in parts."""
+    events, slips, waiting = [], list[_Slip](), sorted(found, key=lambda one: one.frame)
     while waiting:
         slip = waiting.pop(0)
         size = float(np.linalg.norm(slip.vector))
         sums = ((k, one.m, slip.vector + one.vector) for k, one in enumerate(waiting))
-        back = [k for k, m, sum_ in sums if m == slip.m and np.linalg.norm(sum_) < 0.5 * size]
-        kind: Kind = "jump" if back else "slip"
-        frames = slice(slip.frame, waiting.pop(back[0]).frame if back else len(fit.times_s))
-        events.append(event(fit, kind, slip.m, frames, size, slip.z))
+        if back := [k for k, m, sum_ in sums if m == slip.m and np.linalg.norm(sum_) < 0.5 * size]:
+            frames = slice(slip.frame, waiting.pop(back[0]).frame)
+            events.append(event(fit, "jump", slip.m, frames, size, slip.z))
+            continue
+        for k, one in enumerate(slips):
+            if one.m == slip.m and slip.frame - one.frame < least:
+                surest = max(slips.pop(k), slip, key=lambda x: x.z)
+                slip = surest._replace(vector=one.vector + slip.vector)
+                break
+        slips.append(slip)
+    for slip in slips:
+        frames, size = slice(slip.frame, len(fit.times_s)), float(np.linalg.norm(slip.vector))
+        events.append(event(fit, "slip", slip.m, frames, size, slip.z))
     return events
 
 

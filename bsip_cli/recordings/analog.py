@@ -325,13 +325,15 @@ def _stuck(
     return stuck
 
 
-def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Finding]:
-    """Lines for the quality table about one plate's faulty samples."""
-    n, stuck = len(samples.stuck), samples.stuck
+def sample_findings(
+    plate: str, samples: SampleCheck, rate_hz: float, time0_s: float = 0.0
+) -> list[Finding]:
+    """Lines for the quality table about one plate's faulty samples, the first at ``time0_s``."""
+    n, stuck, clock = len(samples.stuck), samples.stuck, (rate_hz, time0_s)
     held = "; ".join(
-        f"channel {i + 1} {times(stuck[:, i], rate_hz)}" for i in np.flatnonzero(stuck.any(axis=0))
+        f"channel {i + 1} {times(stuck[:, i], *clock)}" for i in np.flatnonzero(stuck.any(axis=0))
     )
-    lost, repeated = (times(mask, rate_hz) for mask in (samples.lost, samples.repeated))
+    lost, repeated = (times(mask, *clock) for mask in (samples.lost, samples.repeated))
     said = "none", "marked them unusable", "warning"
     findings = [
         Finding(f"analog_{name}", plate, f"{mask.sum()} of {n} samples {words}", *said)
@@ -353,9 +355,13 @@ def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Fi
     return findings
 
 
-def times(mask: np.ndarray, rate_hz: float, digits: int = 3, most: int = _NAMED) -> str:
-    """The intervals of True in words, from the first sample; ``most`` of them."""
+def times(
+    mask: np.ndarray, rate_hz: float, time0_s: float, digits: int = 3, most: int = _NAMED
+) -> str:
+    """The intervals of True in words, on the file's clock (``time0_s`` is the first sample's);
+    ``most`` of them."""
     intervals = runs(mask)
-    spans = (f"{a:.{digits}f} to {b:.{digits}f} s" for a, b in intervals[:most] / rate_hz)
+    ends_s = time0_s + intervals[:most] / rate_hz
+    spans = (f"{a:.{digits}f} to {b:.{digits}f} s" for a, b in ends_s)
     more = f" and {len(intervals) - most} more" if len(intervals) > most else ""
     return ", ".join(spans) + more

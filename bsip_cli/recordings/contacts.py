@@ -55,6 +55,7 @@ class Contacts:
     usable: np.ndarray  # (n_frames,) bool
     total_N: np.ndarray  # (n_frames,), of all plates
     reasons: tuple[Finding, ...]
+    time0_s: float = 0.0
 
     @property
     def surely_measured(self) -> np.ndarray:
@@ -68,10 +69,11 @@ def foot_contacts(
     rate_hz: float,
     plates: Sequence[Plate],
     n_frames: int,
+    time0_s: float = 0.0,
 ) -> Contacts:
     """Frames in which no foot stands beside the plates, which are at the marker rate.
 
-    ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3).
+    ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3); ``time0_s`` of the first frame.
     """
     beside = nothing = np.zeros(n_frames, bool)
     if not plates:
@@ -79,6 +81,7 @@ def foot_contacts(
     usable = np.logical_and.reduce([plate.usable for plate in plates])
     total = np.sum([plate.lift_N for plate in plates], axis=0)
     on_ground, on_plate, reasons, valid = {}, {}, [], usable.copy()
+    clock = rate_hz, time0_s, *_SAID
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz)
@@ -91,10 +94,11 @@ def foot_contacts(
         )
         for mask, words in said:
             if mask.any():
-                reasons.append(_finding(name, f"{words}: {times(mask, rate_hz, *_SAID)}"))
+                reasons.append(_finding(name, f"{words}: {times(mask, *clock)}"))
     if not usable.all():
-        reasons.append(_finding("", f"force samples unusable: {times(~usable, rate_hz, *_SAID)}"))
-    return Contacts(valid, on_ground, on_plate, beside, usable, total, tuple(reasons))
+        reasons.append(_finding("", f"force samples unusable: {times(~usable, *clock)}"))
+    known = valid, on_ground, on_plate, beside, usable, total, tuple(reasons)
+    return Contacts(*known, time0_s)
 
 
 def contact_windows(
@@ -138,12 +142,16 @@ def contact_windows(
         unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
     if unexplained.any():
         loaded = feet.valid & (feet.total_N > TOUCHED_N)
-        cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file)"
+        cause = (
+            "a contact they do not measure (seat, box, hands, a plate that is not in the file) or, "
+        )
+        cause += "if brief, an impact that the markers do not follow"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
             cause = f"the mass by which they are judged, {mass_kg:.1f} kg, is wrong, or something "
             cause += "bears the person all the time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
-        reasons += (_finding("", f"{force}: {cause} {times(unexplained, rate_hz, *_SAID)}"),)
+        when = times(unexplained, rate_hz, feet.time0_s, *_SAID)
+        reasons += (_finding("", f"{force}: {cause} {when}"),)
     return replace(feet, valid=valid, reasons=reasons)
 
 

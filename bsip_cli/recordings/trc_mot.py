@@ -223,7 +223,7 @@ def _source(
         expected += "; forces after rows that were lost in between come too early"
     findings += [
         replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
-        for one in sample_findings(force.name, samples, grid.rate_hz)
+        for one in sample_findings(force.name, samples, grid.rate_hz, markers.first_s)
     ]
     return replace(source, known=samples.usable())
 

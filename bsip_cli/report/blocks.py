@@ -68,14 +68,6 @@ class Numbered(Block):
     items: tuple[str, ...]
 
 
-def first_of(
-    lines: Sequence[str], most: int, where: str, tone: Tone = "plain"
-) -> tuple[Block, ...]:
-    """So many of the lines, and how many more there are where."""
-    more = (Paragraph(f"{len(lines) - most} more in {where}.", "note"),)
-    return Bullets(tuple(lines[:most]), tone), *(more if len(lines) > most else ())
-
-
 @dataclass(frozen=True)
 class Terms(Block):
     """Names, each with what is to be said of it."""
@@ -157,6 +149,15 @@ class Grid(Block):
     def cells(self) -> list[list[Cell]]:
         """The rows with every cell as a ``Cell``."""
         return [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in self.rows]
+
+
+def first_of(lines: Sequence[str], most: int, name: str, tone: Tone = "plain") -> Block:
+    """So many of the lines; where there are more, all of them are in a file of that name."""
+    if len(lines) <= most:
+        return Bullets(tuple(lines), tone)
+    rows, left = tuple((line,) for line in lines[:most]), f"{len(lines) - most} more:"
+    data = pd.DataFrame({name: lines})
+    return Grid((name.replace("_", " "),), rows, left, name=name, data=data)
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,7 +91,12 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     uses = [m.use for m in record.members if m.use]
     used = listing([f"{name} for {uses.count(name)}" for name in dict.fromkeys(uses)], "not known")
     software = ", ".join(sorted(record.made.versions.get("bsip", ())))
-    people = ("Participants", f"{len(done)} of {everyone} have identified parameters")
+    decided = [m.identification["decided"] for m in done if m.identification is not None]
+    ends = dict.fromkeys(
+        number(x, 0) for x in (min(decided, default=np.nan), max(decided, default=np.nan))
+    )
+    data = f"; the data decide {' to '.join(ends)} of their 150 parameters" if decided else ""
+    people = ("Participants", f"OM of {len(done)} of {everyone}{data}")
     use = ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)")
     yield Terms((people, use, ("Software", f"bsip {software}")))
     yield light_of_all(record)
@@ -106,9 +111,8 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     ]
     missing = list(dict.fromkeys((*record.missing, *refused)))
     yield Heading("Who could not be used, and why")
-    nobody = (Paragraph("Nobody is missing."),)
-    where = "the participants' reports"
-    yield from first_of(missing, _MOST, where, "warning") if missing else nobody
+    nobody = Paragraph("Nobody is missing.")
+    yield first_of(missing, _MOST, "could_not_be_used", "warning") if missing else nobody
 
 
 def light_of_all(record: CohortRecord) -> Light:
@@ -258,10 +262,11 @@ def _cause_rows(record: CohortRecord) -> Iterator[tuple[str | Cell, ...]]:
     for member in record.members:
         for cause in member.searched.causes if member.searched else ():
             texts = [capital(one.in_words()) for one in cause]
+            trials = [*dict.fromkeys(trial_label(x) for one in cause for x in one.trials)]
             yield (
                 Cell(member.id, link=member.link()),
                 texts[0] if len(texts) == 1 else f"One of these: {'; '.join(texts)}",
-                listing([*dict.fromkeys(trial_label(x) for one in cause for x in one.trials)]),
+                "all" if cause[0].is_of_all else listing(trials),
                 probability_words(probability_of(cause)) or MISSING,
             )
 
@@ -386,10 +391,6 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
         rows.append((label, *changes, *map(str, counts)))
     said = TEXTS["om_worse"].format(components=listing(worse)) if worse else TEXTS["om_better"]
     yield Paragraph(said, "warning" if worse else "good")
-    if (name := "grf_vertical") in names:
-        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
-        if np.isfinite(rm_mass):
-            yield Paragraph(errors.one_number_alone(component_label(name), rm_mass, om))
     others = [method for method in METHODS if method != RM]
     of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
     where = "held-out data" if ratios.held_out else "the data that identified the parameters"

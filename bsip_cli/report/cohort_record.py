@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SHOWN = {
     "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
-    "identification": ("duration_s", "condition_number"),
+    "identification": ("duration_s", "condition_number", "decided"),
 }
 """Columns of a participant's artifacts that are shown."""
 

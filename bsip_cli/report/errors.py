@@ -10,10 +10,11 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.words import COMPONENTS, TEXTS, count, listing, number, say
-from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import METHODS, OM, RM, SAME_WITHIN
+from bsip_cli.report.words import COMPONENTS, count, listing, number, say
+from bsip_cli.statistics.choice import Difference, between
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS
 from bsip_cli.statistics.published import load_paper
+from bsip_cli.statistics.samples import Z95
 
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
@@ -21,13 +22,12 @@ _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 @dataclass(frozen=True)
 class Gain:
     """Errors (RMSE) of the methods in one component of one trial: of OM, RM, and RM+mass if there.
-    frames : that they rest on. held_out : OM had not seen the data."""
+    held_out : OM had not seen the data."""
 
     component: str
     unit: str
     of: Mapping[str, float]
     trial: str
-    frames: int
     held_out: bool
 
 
@@ -43,81 +43,61 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
             column, unit = "rmse_percent_bw", "% BW"
         errors = {method: float(row[column]) for method, row in known.items()}
-        frames = min(int(row["n"]) for row in known.values())
         held_out = known[OM]["data"] == "held_out"
-        gains.append(Gain(component, unit, errors, trial, frames, held_out))
+        gains.append(Gain(component, unit, errors, trial, held_out))
     return tuple(gains)
-
-
-def pooled_errors(gains: Iterable[Gain], component: str) -> dict[str, float]:
-    """Of the methods in one component, over all frames of the trials, so that a stride of 0.2 s
-    counts for no more than it is; trials without numbers are left out."""
-    mine = [one for one in gains if one.component == component]
-    known = [one for one in mine if np.isfinite(list(one.of.values())).all()]
-    frames = [one.frames for one in known]
-    squares = {
-        method: [one.of[method] ** 2 for one in known]
-        for method in METHODS
-        if known and all(method in one.of for one in known)
-    }
-    return {m: float(np.sqrt(np.average(x, weights=frames))) for m, x in squares.items()}
-
-
-def one_number_alone(quantity: str, rm_mass: float, om: float) -> str:
-    """What one number for the whole mass does without identification, in a sentence; ``rm_mass`` and
-    ``om``: relative change of RM's error by these methods, -0.4 is 40 % less."""
-    over_rm_mass = (1.0 + om) / (1.0 + rm_mass) - 1.0 if rm_mass > -1.0 else np.nan
-    known = {"quantity": quantity, "rm_mass": rm_mass, "om": om, "over": over_rm_mass}
-    return say("one_number", same=SAME_WITHIN, **known)
 
 
 # --- which parameters ---------------------------------------------------------------------------
 
 
 def use_sentence(
-    choice: pd.DataFrame | None,
-    identification: pd.DataFrame,
-    waits: str = "",
-    is_known: bool = False,
+    choice: pd.DataFrame | None, identification: pd.DataFrame, lead: str = "Use"
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names. ``waits``: what is to be done first; ``is_known``: what the method
-    is has been said."""
-    full, brief = (TEXTS[name] for name in ("methods_in_full", "methods"))
-    if is_known:
-        full = brief = {method: method for method in METHODS}
-    use = f"{waits} Then use" if waits else "Use"
+    the artifacts of these names."""
     if choice is None or choice.empty:
-        return f"{use} {full[RM]}: nothing was compared."
-    first = choice.iloc[0]
+        return f"{lead} {RM}: nothing was compared."
+    first = _of_its_movements(choice)
     others = [
-        f"{brief[method]} for {listing(list(rows['movement']))}"
-        + ("" if is_known else f", where OM is {'' if method == OM else 'not '}clearly better")
+        f"{method} for {listing(list(rows['movement']))}"
         for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    most = full[first["use"]]
-    if others:
-        most = brief[first["use"]]
-        most = f"else {most}" if is_known else f"{most} for all other movements"
+    most = f"{'else ' if others else ''}{first['use']}"
+    for row in identification[identification["method"] == first["use"]].itertuples():
+        if row.method == RM_MASS:
+            error = number(Z95 * row.mass_factor_sd, 2)
+            most += f" (the table times {number(row.mass_factor, 3)} ± {error})"
     rare = identification.loc[identification["rare"].astype(bool), "method"].tolist()
-    compared = _compared(first, together=bool(others), is_rare=OM in rare)
-    said = f"{use} {(', ' if is_known else ', and ').join([*others, most])}{compared}."
+    is_of_none = bool(others) and first["movement"] == choice.iloc[0]["movement"]
+    compared = _compared(first, is_of_none, is_rare=OM in rare)
+    said = f"{lead} {', '.join([*others, most])}{compared}."
     why = "what is wrong in the recordings gave it a body that fewer than 1 in 100 people have"
     return " ".join([said, *(f"Do not use {method}: {why}." for method in rare)])
 
 
+def _of_its_movements(choice: pd.DataFrame) -> pd.Series:
+    """What speaks for the method to use mostly: of the movements alone in which it is to be used, if
+    there are some; else of all together."""
+    first, own = choice.iloc[0], choice.iloc[1:].query("use == @choice.use.iloc[0]")
+    if len(own) < 2:
+        return own.iloc[0] if len(own) else first
+    logs = {x: between(np.log(own[f"ratio_{x}"])) for x in _PAIRS}
+    known = {f"ratio_{x}": one.ratio for x, one in logs.items()}
+    known |= {f"log_error_{x}": one.error for x, one in logs.items()}
+    return pd.Series({**own.iloc[0], **known, "trials": own["trials"].sum()})
+
+
 def _compared(first: pd.Series, together: bool, is_rare: bool) -> str:
     """What the choice rests on, to go on with after the method's name; ``together``: over movements
-    of which some ask for another method; ``is_rare``: OM is ruled out by its body."""
+    of which all ask for another method; ``is_rare``: OM is ruled out by its body."""
     changes = {x: _change(first[f"ratio_{x}"], first[f"log_error_{x}"]) for x in _PAIRS}
     known = bool(np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all())
-    n = int(first["trials"])
-    every = "all " if together and n > 1 else ""
-    others = "both other recordings" if every and n == 2 else every + count(n, "other recording")
+    n, all_together = int(first["trials"]), "together " if together else ""
     where = {
-        "whole_trials": f"in {others} ",
-        "held_out": f"in {every}seconds of {count(n, 'recording')} that were held out ",
+        "whole_trials": f"in {count(n, 'other recording')} {all_together}",
+        "held_out": f"in seconds of {count(n, 'recording')} that were held out {all_together}",
     }.get(str(first["data"]), "")
     methods = {"use": first["use"], "together": together, "is_rare": is_rare}
     return say("compared", known=known, where=where, **methods, **changes)
@@ -143,8 +123,8 @@ COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_perce
 """Options of the diagnosis: errors that are called large."""
 
 SOURCES = (
-    "RMS, measured less computed: good to the first mark (Hansen 2017), bad from the second "
-    "(Hicks 2015; markers: OpenSim)."
+    "RMS of what OM had not seen, usable or not: good to the first mark (Hansen 2017), bad from the "
+    "second (Hicks 2015; markers: OpenSim)."
 )
 ENDS_AT = 2.0  # times the size that is called large, where every scale ends
 _MARKER_GOOD_MM, MARKER_LIMIT_MM = 10.0, 20.0

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
+from bsip_cli.body.markersets import shipped_names
 from bsip_cli.report import blocks, errors, recordings, verdict
 from bsip_cli.report import budget as budgets
 from bsip_cli.report.causes import (
@@ -40,6 +42,7 @@ _BRIEF_WORDS = 12  # of a finding that is named only; else its title
 _FEW = 3  # findings, whose actions are all given
 _MOST_TO_DO = 3
 _MOST_FILES = 2  # that are named
+_WORST = 3  # markers of a bad calibration
 _POSES = 8  # among which the one is chosen that is shown
 
 
@@ -54,14 +57,12 @@ def front(record: ParticipantRecord) -> tuple[blocks.Block, ...]:
         blocks.Heading("Is anything wrong?"),
         replace(light, text="") if says_it else light,
     )
-    known = record.choice, record.identification
-    use = errors.use_sentence(*known, recordings.must_wait(record), is_known=True)
     then = (
         *_sizes(record),
         *_sure(record, light),
         blocks.Heading("What may be used?"),
         blocks.Bullets(tuple(recordings.use_lines(record))),
-        blocks.Paragraph(use),
+        blocks.Paragraph(recordings.use_said(record, brief=True)),
         blocks.Heading("What to do next"),
     )
     for most, named in _FINDINGS:
@@ -96,13 +97,31 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     short = abbreviations(names)
     yield "Recordings", f"{listing(tasks)}{f' ({short})' if short else ''}; {_recorded(record)}"
     yield "Files", _files(record)
+    if assumed := "; ".join(_assumed(record)):
+        yield "Assumed", assumed
     used = listing([names_of(record)[t.stem] for t in record.identification_trials()], "nothing")
-    yield "Parameters", TEXTS["parameters"].format(trials=used)
+    yield "Parameters", TEXTS["parameters"].format(trials=used, decided=record.decided_words())
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Report", f"{record.made_on}, bsip {', '.join(versions)}"
     for name in ("mass", "height"):
         if note := str(record.facts[f"{name}_note"]):
             yield capital(name), f"{capital(note)}."
+
+
+def _assumed(record: ParticipantRecord) -> Iterator[str]:
+    """What nobody has stated or checked, and on which the results rest."""
+    if record.facts["sex"] not in _SEXES:
+        yield TEXTS["assumed"]["sex"]
+    if record.facts["height_source"] == "markers":
+        yield TEXTS["assumed"]["height"]
+    tables = [trial.quality for trial in record.trials if trial.quality is not None]
+    rows = [t[(t["check"] == "marker_set") & (t["level"] == "info")] for t in tables]
+    sets = dict.fromkeys(pair for t in rows for pair in zip(t["found"], t["action"], strict=True))
+    for name, description in sets:
+        if name not in shipped_names():
+            yield TEXTS["assumed"]["markers"].format(name=name, description=description)
+    if record.outside:
+        yield record.outside.partition(":")[0]
 
 
 def _recorded(record: ParticipantRecord) -> str:
@@ -186,6 +205,9 @@ def _in_brief(causes: Mapping[int, Cause], named: int, names: Mapping[str, str])
     groups.sort()
     for numbers, titles in groups[:named]:
         own = causes[numbers[0]]
+        if own[0].class_id == OF_THE_WEIGHT:  # one of its causes is none of the recordings
+            yield f"{in_a_row(numbers)}: {own[0].words.against}"
+            continue
         what = own[0].words.short or own[0].words.what
         if len(numbers) == len(own) == 1 and len(what.split()) <= _BRIEF_WORDS:
             where = [names[stem] for stem in own[0].trials if stem in names]
@@ -210,7 +232,8 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
     said = [verdict.unseen(record.detection, record.diagnosis)]
     if light.state == "large":
         part, is_left = recordings.main_part(record)
-        known = "unknown" if part is None else "part" if is_left else "known"
+        some = is_left if part else "of it unknown" in light.title  # the rest is not
+        known = "part" if some else "known" if part else "unknown"
         said = [TEXTS["sure"][known], *(said if known == "known" else [])]
     elif not record.causes:
         said = ["No fault is more probable than not.", *said]
@@ -223,15 +246,13 @@ def _sure(record: ParticipantRecord, light: blocks.Light) -> Iterator[blocks.Blo
 
 
 def _sizes(record: ParticipantRecord) -> Iterator[blocks.Block]:
-    """The yardsticks by the parameters to use, by the table's or those that have to wait, and what
-    makes the errors of the table's."""
-    used = record.use_words()
-    first, other = recordings.shown_of(record), recordings.measured_of(record, RM)
-    later = " (not yet)" if recordings.must_wait(record) else ""
+    """The yardsticks by the parameters to use, by the table's or OM that has to wait, and what makes
+    the errors of the table's."""
+    used, later = recordings.use_words(record), recordings.not_yet(record)
+    first, other = recordings.measured_of(record), recordings.measured_of(record, RM)
     which = f"? ● {used}{later}, ○ {RM}" if used != RM else f" with {RM}?"
     if recordings.om_waits(record):
-        other = recordings.measured_of(record)
-        which = f"? ● {RM}, ○ {used}{later}"
+        other, which = recordings.measured_of(record, OM), f"? ● {used}{later}, ○ {OM} (not yet)"
     scales = [
         (one, size, None if one.shown(other[one]) == one.shown(size) else other[one])
         for one, size in first.items()
@@ -248,11 +269,11 @@ def budget_bar(record: ParticipantRecord) -> Iterator[blocks.Block]:
         return
     findings = {k: effects_in([cause]) for k, cause in recordings.numbered(record).items()}
     if pieces := budgets.numbered_pieces(record.budget, findings):
-        use, own = record.use(), budgets.PARAMETERS
-        if use == OM and not (recordings.om_waits(record) or recordings.beyond(record)):
+        use, own = recordings.use_now(record), budgets.PARAMETERS
+        if use == OM and not recordings.beyond(record):
             known = f"{own} (OM corrects these)"
             pieces = tuple(replace(one, label=one.label.replace(own, known)) for one in pieces)
-        before = " with RM" if use != RM else ""
+        before = " with RM" if record.use() != RM else ""
         yield blocks.Bar(TEXTS["bar"].format(before=before), pieces)
 
 
@@ -264,6 +285,7 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
     causes, first = _causes_shown(record, most), 1 + len(large_finding(record))
     few = record.causes if len(record.causes) <= _FEW else causes or record.causes[:1]
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
+    said += _calibration(record)
     said += _look_at(record)
     said += verdict.consequences(few, first, only_actions=True)
     groups = [(k, cause) for k, cause in enumerate(causes, first) if len(cause) > 1]
@@ -283,6 +305,16 @@ def to_do(record: ParticipantRecord, light: blocks.Light, most: int) -> list[str
         text = rows["text"].iloc[0]
         fine.append(f"Optional, to know the parameters better, record: {text}.")
     return said + fine
+
+
+def _calibration(record: ParticipantRecord) -> Iterator[str]:
+    """Which markers to look at, where all else rests on a bad calibration."""
+    uses = recordings.uses_of(record)
+    for trial in (t for t in record.trials if uses[t.stem].kind == "calibration"):
+        rows = pd.DataFrame() if trial.residuals is None else trial.residuals.dropna()
+        sizes = rows.groupby("marker")["residual_m"].mean() if len(rows) else pd.Series(dtype=float)
+        worst = [f"{name} ({1e3 * m:.0f} mm)" for name, m in sizes.nlargest(_WORST).items()]
+        yield TEXTS["to_do"]["calibration"].format(trial=trial.label, markers=listing(worst))
 
 
 def _look_at(record: ParticipantRecord) -> Iterator[str]:
@@ -317,7 +349,8 @@ def _look_for(record: ParticipantRecord, trial: TrialRecord, error: errors.Yards
             return texts["part"].format(
                 trial=name, part=main.label, error=error.in_sentence(), help="; ".join(helps)
             )
-    shape = recordings.shape_of(trial.reconstruction, record.use(trial.task), _SIGNALS[error.name])
+    use = recordings.use_now(record, trial.task)
+    shape = recordings.shape_of(trial.reconstruction, use, _SIGNALS[error.name])
     if shape is None:
         return ""
     when, check = texts["shapes"][shape.kind]

@@ -12,7 +12,16 @@ from bsip_cli.report.causes import Candidate, effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, curves
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.words import EXTENDED, TEXTS, count, number, say, segment_label, signed
+from bsip_cli.report.words import (
+    EXTENDED,
+    TEXTS,
+    count,
+    listing,
+    number,
+    say,
+    segment_label,
+    signed,
+)
 from bsip_cli.statistics.methods import OM, RM, is_extended
 from bsip_cli.statistics.samples import Z95
 
@@ -33,7 +42,7 @@ def joint_blocks(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph(f"{TEXTS['no_moments']} {_left_out(trials[0])}", "warning")
         return
     yield Paragraph(TEXTS["net_moments"])
-    yield _picture(trial, joints, record.use())
+    yield _picture(trial, joints)
     yield from (Paragraph(f"{said}.") for said in largest_changes(all_peaks(trials)))
     yield _peaks_grid(trial, joints, all_peaks(trials))
     if left := _left_out(trial):
@@ -63,7 +72,7 @@ def _chosen(trials: Sequence[TrialRecord]) -> tuple[TrialRecord, tuple[str, ...]
     return trials[0], ()
 
 
-def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
+def _picture(trial: TrialRecord, joints: Sequence[str]) -> Picture:
     """Of each joint's first axis, flexion or extension."""
     moments = trial.joint_moments
     assert moments is not None
@@ -88,7 +97,7 @@ def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
         panels.append(Panel(title, of[methods[0]]["time_s"].to_numpy(), named, spreads))
     columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
     figure = curves(panels, 2, 32.0)
-    return picture("joint_moments", figure, data[columns], trial=trial.label, use=use)
+    return picture("joint_moments", figure, data[columns], trial=trial.label)
 
 
 def _peaks_grid(trial: TrialRecord, joints: Sequence[str], every: pd.DataFrame) -> Grid:
@@ -168,8 +177,10 @@ def moment_change(
     rows = known[known["method"].str.endswith(f"+{one.effect}") & known["trial"].isin(one.trials)]
     if rows.empty:
         return ""
-    if rows["change_percent"].max() < 1.0:
-        return "joint moments change under 1 %"
+    if rows["change_percent"].max() < 1.0:  # of joints that are left out nothing is known
+        kinds = {joint.rpartition("_")[0] for joint in rows["joint"]}
+        shown = [kind for kind in (*_LEGS, *_ARMS) if kind in kinds]
+        return f"{listing(shown)} moments change under 1 %"
     most = rows.iloc[0]
     percent = number(most["change_percent"], 0 if most["change_percent"] >= 1.0 else 1)
     return f"changes the {segment_label(most['joint'])}'s moment by {percent} % of its peak"

@@ -28,6 +28,7 @@ from bsip_cli.report.causes import (
     USUAL,
     Candidate,
     Limit,
+    analysed,
     candidates_of,
     effect_title,
     effects_in,
@@ -41,7 +42,7 @@ from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, curves, error_bars, marker_bars, segment_masses
 from bsip_cli.report.first_page import front
 from bsip_cli.report.joints import joint_blocks
-from bsip_cli.report.recordings import large_finding, uses_of
+from bsip_cli.report.recordings import large_finding, use_said, uses_of
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.words import (
     COMPONENTS,
@@ -104,6 +105,9 @@ def _diagnosis(record: ParticipantRecord) -> Iterator[Block]:
     events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
     yield Numbered(said.causes) if said.causes else Paragraph(said.headline)
     yield from map(Paragraph, (*verdict.corrected_sentence(events), *said.results))
+    searched = analysed(record.detection, record.diagnosis)
+    if left := [trial.label for trial in record.trials if trial.stem not in searched]:
+        yield Paragraph(TEXTS["not_analysed"].format(trials=listing(left)))
     yield from [Heading("What to do"), Bullets(said.advice)] if said.advice else []
     yield from nearest(candidates_of(record.diagnosis))
     yield Heading("What might have gone unseen")
@@ -114,12 +118,16 @@ def _diagnosis(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
-    """The causes that came nearest to being found."""
-    rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
+    """The causes that came nearest to being found, each once, and none that was found elsewhere."""
+    found = {one.label for one in candidates if one.verdict != "rejected"}
+    rejected: dict[str, Candidate] = {}
+    for one in candidates:
+        if one.label not in found:
+            rejected.setdefault(one.label, one)
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
     rows = []
-    for one in rejected:
+    for one in list(rejected.values())[:_NEAREST]:
         sure = probability_words(one.probability) or MISSING
         rows.append((one.label, sure, number(one.rms_change, 1), one.removes()))
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
@@ -248,15 +256,8 @@ def _errors(record: ParticipantRecord) -> Iterator[Block]:
     if not by_trial:
         yield Paragraph("No recording could be compared with both methods.", "warning")
         return
-    held_out = [gain for gain in gains if gain.held_out]
-    if not held_out:
+    if not any(gain.held_out for gain in gains):
         yield Paragraph(TEXTS["nothing_held_out"], "warning")
-    factor = record.identification.query("method == @RM_MASS")["mass_factor"]
-    of = errors.pooled_errors(held_out or gains, "grf_vertical")
-    if len(factor) and RM_MASS in of:
-        changes = (of[m] / of[RM] - 1.0 if of[RM] > 0.0 else np.nan for m in (RM_MASS, OM))
-        said = errors.one_number_alone(component_label("grf_vertical"), *changes)
-        yield Paragraph(f"{said} RM+mass is {RM} times {number(factor.iloc[0], 3)}.")
     rows: list[tuple[str | Cell, ...]] = []
     for trial, gain_of in by_trial.items():
         used = "" if next(iter(gain_of.values())).held_out else " (identified OM)"
@@ -291,10 +292,7 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
     choice = record.choice
     if choice is None or choice.empty:
         return
-    yield Paragraph(str(choice["sentence"].iloc[0]))
-    for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
-        why = f"a body like this is rarer than 1 in 100 people, most by {row.farthest}"
-        yield Paragraph(f"Do not use {row.method}: {why}.", "warning")
+    yield Paragraph(use_said(record))
     if not choice["trials"].iloc[0]:
         return
     rows = []
@@ -306,7 +304,7 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
             ends = f" ({low} to {high})" if low != MISSING else ""
             ratios.append(f"{number(ratio, 2)}{ends}")
         rows.append((one["movement"], one["use"], *ratios, str(one["trials"])))
-    head = ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
+    head = ("movement", "best", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings")
     yield Grid(head, tuple(rows), _CAPTIONS["choice"], words=2)
 
 
@@ -386,14 +384,14 @@ def _recording(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph(TEXTS["loads"].format(carried=carried))
     if lines := _findings(record):
         yield Heading("Repaired, left out, warned of")
-        yield from first_of(lines, _MOST_FINDINGS, "the recordings' quality artifacts")
+        yield first_of(lines, _MOST_FINDINGS, "recording_warnings")
     else:
         yield Paragraph("Nothing was repaired, excluded or warned of.")
     yield from _markers(record)
     known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
     lines = [f"{label}: {sentence}" for label, table in known for sentence in table["sentence"]]
     if lines:
-        yield from first_of(lines, _MOST_EVENTS, "the trials' marker-events")
+        yield first_of(lines, _MOST_EVENTS, "marker_events")
     elif known:
         yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
 
@@ -412,7 +410,8 @@ def _trials(record: ParticipantRecord) -> Grid:
                 percent(float(frame["determined"].astype(float).mean())),
                 number(trial.markers_mm()),
             )
-        rows.append((trial.label, ROLES[trial.role], uses[trial.stem].in_words(), *numbers))
+        roles = listing([ROLES[one] for one in record.roles_of(trial)], MISSING)
+        rows.append((trial.label, roles, uses[trial.stem].in_words(), *numbers))
     head = ("recording", "role", "use", "duration [s]", "forces compared [%]", "pose known [%]")
     return Grid((*head, "markers [mm]"), tuple(rows), _CAPTIONS["trials"], words=3)
 

@@ -4,7 +4,7 @@ recordings may still be used, and for what."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -30,6 +30,7 @@ from bsip_cli.report.errors import (
     MARKERS,
     Yardstick,
     errors_of,
+    use_sentence,
     yardsticks,
 )
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
@@ -50,10 +51,11 @@ _once = lru_cache(maxsize=1)  # of the person at hand: many places ask
 def _sizes(
     record: ParticipantRecord, trials: Sequence[TrialRecord], markers_mm: float, method: str = ""
 ) -> dict[Yardstick, float]:
-    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials."""
+    """The yardsticks, with the limits that the diagnosis was run with, and numbers of trials; by a
+    method, or by the one to use now."""
     limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
     fits = [
-        trial.fit[trial.fit["method"] == (method or record.use(trial.task))]
+        trial.fit[trial.fit["method"] == (method or use_now(record, trial.task))]
         for trial in trials
         if trial.fit is not None
     ]
@@ -62,14 +64,9 @@ def _sizes(
 
 
 def measured_of(record: ParticipantRecord, method: str = "") -> dict[Yardstick, float]:
-    """The three yardsticks with this person's numbers, by a method, or by the one to use."""
+    """The three yardsticks with this person's numbers, by a method, or by the one to use now."""
     markers_mm = 1e3 * float(record.facts["marker_rms_m"])
     return _sizes(record, record.moving_trials(), markers_mm, method)
-
-
-def shown_of(record: ParticipantRecord) -> dict[Yardstick, float]:
-    """The same by the table's parameters as long as OM has to wait: what counts for this person."""
-    return measured_of(record, RM if om_waits(record) else "")
 
 
 @_once
@@ -122,6 +119,11 @@ def names_of(record: ParticipantRecord) -> dict[str, str]:
 # --- the answer, and the finding that it is -------------------------------------------------------
 
 
+def even_with_om(record: ParticipantRecord) -> bool:
+    """Whether errors are large with OM, where that is to be used, be it later."""
+    return record.use() == OM and bool(_large(measured_of(record, OM)))
+
+
 @_once
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
@@ -129,11 +131,8 @@ def light_for(record: ParticipantRecord) -> Light:
     alone = [names_of(record)[trial.stem] for trial in large_alone(record, with_markers=True)]
     tables = record.diagnosis, record.detection, record.budget
     before = int(bool(large) and not is_said(record))  # `large_finding`
-    light = verdict.light_of(*tables, large, record.use(), alone, before)
-    if om_waits(record) and _large(measured_of(record, RM)):  # which is for now
-        title = light.title.replace("no large error", f"no large error with {OM}")
-        light = replace(light, title=title)
-    return light
+    even = even_with_om(record)
+    return verdict.light_of(*tables, large, use_now(record), alone, before, even)
 
 
 @_once
@@ -148,7 +147,7 @@ def large_finding(record: ParticipantRecord) -> tuple[str, ...]:
     own = _of_each(record)[worst.stem][first] if worst else size
     said = say(
         "large_finding",
-        used=record.use_words(),
+        used=use_now(record, worst.task) if worst else use_words(record),
         errors=[one.short() for one, _ in found],  # of several the yardsticks have the sizes
         size=number(size),
         unit=first.brief_unit(),
@@ -189,7 +188,7 @@ def main_part(record: ParticipantRecord) -> tuple[Piece | None, bool]:
     """Of a large error, what makes the largest part; None if unknown, so that nothing is of unknown
     cause whose bar has no such part. And whether that is what OM has left."""
     found = effects_in(record.causes)
-    ranked, is_left = verdict.ranked_parts(record.budget, found, record.use())
+    ranked, is_left = verdict.ranked_parts(record.budget, found, even_with_om(record))
     is_known = bool(ranked) and ranked[0].label not in verdict.NO_CAUSE
     return (ranked[0] if is_known else None), is_left
 
@@ -258,49 +257,93 @@ def _listed(stems: Sequence[str], record: ParticipantRecord) -> str:
     return listing(items)
 
 
-def must_wait(record: ParticipantRecord) -> str:
-    """Why the parameters should not be used yet, and what to do: not all recordings that identified
-    those to use may be used themselves, or errors are large and no recording may; else empty."""
-    if own := om_waits(record):
-        return TEXTS["usable"]["identified"].format(trials=listing(own))
-    usable = any(use.kind in _USABLE for use in uses_of(record).values())
+def _before_any(record: ParticipantRecord) -> str:
+    """What has to be done before any parameters are used: the calibration is bad, or errors are large
+    and no recording may be used; else empty."""
+    kinds = {use.kind for use in uses_of(record).values()}
+    if "calibration" in kinds:
+        return str(TEXTS["usable"]["calibration"])
     is_large = light_for(record).state == "large"
-    return TEXTS["usable"]["large"] if is_large and not usable else ""
+    return TEXTS["usable"]["large"] if is_large and kinds.isdisjoint(_USABLE) else ""
+
+
+def must_wait(record: ParticipantRecord) -> str:
+    """The same, or why OM should not be used yet: not all recordings that identified it may be used
+    themselves."""
+    trials = listing(om_waits(record), "")
+    later = TEXTS["usable"]["identified"].format(trials=trials) if trials else ""
+    return _before_any(record) or later
 
 
 @_once
 def om_waits(record: ParticipantRecord) -> list[str]:
     """Names of the recordings for which OM, where that is to be used, has to wait."""
-    own = record.identification_trials() if record.use() == OM else ()
-    causes = dict(enumerate(record.causes))
-    kinds = {trial.stem: _use_of(record, trial, causes).kind for trial in own}
+    uses = {record.use(), *(record.use(trial.task) for trial in record.moving_trials())}
+    own = record.identification_trials() if OM in uses else ()
+    causes, kinds = dict(enumerate(record.causes)), {}
+    for trial in own:
+        sizes = _sizes(record, [trial], trial.markers_mm(), OM)
+        kinds[trial.stem] = _use_of(record, trial, causes, sizes).kind
     return [names_of(record)[stem] for stem, kind in kinds.items() if kind not in _USABLE]
 
 
-def use_now(record: ParticipantRecord) -> str:
-    """The method whose parameters to use as long as OM has to wait, if it does."""
-    return RM if om_waits(record) else record.use()
+def use_now(record: ParticipantRecord, movement: str = "all") -> str:
+    """The method whose parameters to use, in one movement or mostly: the table's as long as OM has
+    to wait, if it does. Every number and sentence of a page is of these."""
+    found = record.use(movement)
+    return RM if found == OM and om_waits(record) else found
+
+
+def use_words(record: ParticipantRecord) -> str:
+    """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""
+    others: dict[str, list[str]] = {}
+    for movement in dict.fromkeys(trial.task for trial in record.moving_trials()):
+        others.setdefault(use_now(record, movement), []).append(movement)
+    others.pop(first := use_now(record), None)
+    said = "; ".join(f"{', '.join(some)}: {method}" for method, some in others.items())
+    return f"{first} ({said})" if said else first
+
+
+def not_yet(record: ParticipantRecord) -> str:
+    """After the parameters to use, where something has to be done before any are."""
+    return " (not yet)" if _before_any(record) else ""
+
+
+def use_said(record: ParticipantRecord, brief: bool = False) -> str:
+    """Which parameters to use, and why, in sentences; or what has to be done before, with what the
+    errors so far tell, if not ``brief``."""
+    waits = must_wait(record)
+    if waits and brief:
+        return waits
+    lead = f"{waits} {TEXTS['so_far']}" if waits else "Use"
+    return use_sentence(record.choice, record.identification, lead)
 
 
 @_once
 def uses_of(record: ParticipantRecord) -> dict[str, Use]:
     """Of each recording, by its stem, as far as its errors and the findings tell."""
     causes = numbered(record)
-    return {trial.stem: _use_of(record, trial, causes) for trial in record.trials}
+    return {t.stem: _use_of(record, t, causes, _of_each(record)[t.stem]) for t in record.trials}
 
 
-def _use_of(record: ParticipantRecord, trial: TrialRecord, causes: Mapping[int, Cause]) -> Use:
+def _use_of(
+    record: ParticipantRecord,
+    trial: TrialRecord,
+    causes: Mapping[int, Cause],
+    every: Mapping[Yardstick, float],
+) -> Use:
     """By the worst of its markers, its forces and the findings that concern it; ``causes``: all
-    findings of the diagnosis by their numbers."""
+    findings of the diagnosis by their numbers; ``every``: its errors."""
+    calibrates = trial.role == "static" and trial.stem == record.facts["calibration_trial"]
+    out = "calibration" if calibrates else "out"  # on the calibration all else rests
     if trial.kinematics is None or trial.kinematics.empty:
-        return Use("out", "no motion was computed")
+        return Use(out, "no motion was computed")
     found = {k: cause for k, cause in causes.items() if _concerns(cause, trial)}
     families = {k: {EFFECT_WORDS[one.effect].family for one in of} for k, of in found.items()}
-    every = _of_each(record)[trial.stem]
     large = sorted(_large(every), key=lambda pair: -pair[1] / pair[0].limit)
     sizes = {x.name: f"{x.brief} error {number(size)} {x.brief_unit()}" for x, size in large}
     if MARKERS in sizes:
-        return Use("out", listing([*sizes.values()]), sizes[MARKERS])
+        return Use(out, listing([*sizes.values()]), sizes[MARKERS])
     unexplained = findings([k for k, cause in found.items() if is_large(cause)])
     moved = findings([k for k, of in families.items() if of <= _OF_THE_MOTION])
     if wrong := [*sizes.values()] or [unexplained] * bool(unexplained):
@@ -315,8 +358,9 @@ def _use_of(record: ParticipantRecord, trial: TrialRecord, causes: Mapping[int, 
 
 
 def _concerns(cause: Sequence[Candidate], trial: TrialRecord) -> bool:
-    """What quiet stance shows of a mass or a plate concerns all recordings."""
-    is_of_all = cause[0].class_id == OF_THE_WEIGHT
+    """What quiet stance shows of a mass or a plate concerns all recordings, and so does what all
+    persons of a laboratory share."""
+    is_of_all = cause[0].class_id == OF_THE_WEIGHT or cause[0].is_of_all
     return is_of_all or any(trial.stem in one.trials for one in cause)
 
 

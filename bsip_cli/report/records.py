@@ -16,7 +16,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Terms, first_of
 from bsip_cli.report.causes import Candidate, candidates_of, causes_of
 from bsip_cli.report.words import EXTENDED, labelled, method_rank, trial_label
-from bsip_cli.statistics.methods import MEASURED, RM, is_extended
+from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ class TrialRecord:
 
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
-    """One participant; ``facts`` is the single row of the ``person`` artifact, ``made_on`` the day
+    """One participant; ``facts`` is the single row of the ``person`` artifact, ``outside`` why the
+    table does not hold for this person, if so, ``made_on`` the day
     of the report, ``recorded_on`` those of the recordings as the study states them, ``loads`` the
     known loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
     ``changes`` (of a model extended by what was found), and ``choice`` are None where their stages
@@ -87,6 +88,7 @@ class ParticipantRecord:
     origins: tuple[Origin, ...]
     defaults: Mapping[str, Any]
     made_on: str
+    outside: str = ""
     recorded_on: tuple[str, ...] = ()
     loads: tuple[tuple[str, str], ...] = ()
     diagnosis: pd.DataFrame | None = None
@@ -114,6 +116,21 @@ class ParticipantRecord:
         named = {stem for row in self.identification["trials"] for stem in str(row).split(", ")}
         return tuple(trial for trial in self.trials if trial.stem in named)
 
+    def decided_words(self) -> str:
+        """``, data decide 9 of 150 parameters``; empty where that is not known."""
+        known = self.identification.query("method == @OM")["decided"].dropna()
+        whole = 10 * len(self.method(OM))
+        return "".join(f", data decide {n:.0f} of {whole} parameters" for n in known)
+
+    def roles_of(self, trial: TrialRecord) -> tuple[str, ...]:
+        """What it served for, whatever its task: keys of the roles in the texts."""
+        known = {
+            "static": trial.stem == self.facts["calibration_trial"],
+            "sequence": trial in self.identification_trials(),
+        }
+        validates = trial in self.moving_trials() and trial.fit is not None
+        return tuple(role for role, is_so in known.items() if is_so) or ("validation",) * validates
+
     def moving_trials(self) -> tuple[TrialRecord, ...]:
         """Those in which somebody moves: quiet stance distinguishes no methods."""
         return tuple(trial for trial in self.trials if trial.role != "static")
@@ -125,15 +142,6 @@ class ParticipantRecord:
             return RM
         chosen = dict(zip(self.choice["movement"], self.choice["use"], strict=True))
         return str(chosen.get(movement, self.choice["use"].iloc[0]))
-
-    def use_words(self) -> str:
-        """``OM (running, walking: RM)``: where other parameters are to be used than mostly."""
-        others: dict[str, list[str]] = {}
-        for movement in dict.fromkeys(trial.task for trial in self.moving_trials()):
-            others.setdefault(self.use(movement), []).append(movement)
-        others.pop(self.use(), None)
-        said = "; ".join(f"{', '.join(some)}: {method}" for method, some in others.items())
-        return f"{self.use()} ({said})" if said else self.use()
 
     def option(self, section: str, name: str) -> float:
         """An option that a stage was run with, or as shipped."""
@@ -212,13 +220,11 @@ class HowMade:
 def how_made(made: HowMade, defaults: Mapping[str, Any]) -> Iterator[Block]:
     """Warnings, versions, options that differ from the shipped ones, and the recordings with the
     start of their hashes."""
-    said = [
-        f"{stage}{f' ({unit})' if unit else ''}: {labelled(text)}"
-        for stage, unit, text in made.messages
-    ]
+    of_the_person_first = sorted(made.messages, key=lambda one: bool(one[1]))
+    said = [f"{stage}: {labelled(text)}" for stage, _, text in of_the_person_first]
     yield Heading("Warnings")
-    nothing = (Paragraph("No stage had anything to warn of."),)
-    yield from first_of(said, _MOST_WARNINGS, "the artifacts") if said else nothing
+    nothing = Paragraph("No stage had anything to warn of.")
+    yield first_of(said, _MOST_WARNINGS, "warnings") if said else nothing
     shipped = {name: {_as_text(value)} for name, value in flat(defaults)}
     changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
     yield Heading("Options that differ from the shipped ones")

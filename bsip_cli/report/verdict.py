@@ -38,7 +38,7 @@ from bsip_cli.report.words import (
     say,
     trial_label,
 )
-from bsip_cli.statistics.methods import OM, RM
+from bsip_cli.statistics.methods import RM
 
 ALL_FAULTS = "wrong"  # address of the section that has all of them
 _MOST_GAINS = 3
@@ -124,11 +124,13 @@ def light_of(
     use: str = RM,
     alone: Sequence[str] = (),
     before: int = 0,
+    even_with_om: bool = False,
 ) -> Light:
     """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
     nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are with
     the method ``use``, None where that is not known; ``alone``: the recordings whose own errors
-    are; ``budget`` is of RM's; ``before``: findings of the report besides the diagnosis'."""
+    are; ``budget`` is of RM's; ``before``: findings of the report besides the diagnosis';
+    ``even_with_om``: they are large with OM, too."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
@@ -144,7 +146,7 @@ def light_of(
     n = len(causes) + before
     found = count(n, "finding")
     if large or any(is_large(cause) for cause in causes):
-        title = f"Large error{mostly(budget, effects, use)}"
+        title = f"Large error{mostly(budget, effects, even_with_om)}"
         title += f"; {found}" if n > 1 else ""  # one is the error itself
         said = f"Large with {METHODS[use]}: {listing(large)}." if large else ""
         return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
@@ -160,23 +162,23 @@ def light_of(
     return Light("cause", title, f"Searched: {looked}." if np.isnan(share) else makes)
 
 
-def mostly(budget: pd.DataFrame | None, found: Collection[str], use: str = RM) -> str:
+def mostly(budget: pd.DataFrame | None, found: Collection[str], even_with_om: bool) -> str:
     """Of a large error, what makes most of it, one part or two: ``, most of it soft tissue (56 %)``;
-    else the largest part. Errors with identified parameters are not the table's."""
-    ranked, is_left = ranked_parts(budget, found, use)
+    else the largest part."""
+    ranked, is_left = ranked_parts(budget, found, even_with_om)
     parts = [(one.label, one.share) for one in ranked[:2]] + [("", 0.0)] * 2
     return say("mostly", is_left=is_left, parts=parts, nameless=("", *NO_CAUSE))
 
 
 def ranked_parts(
-    budget: pd.DataFrame | None, found: Collection[str], use: str
+    budget: pd.DataFrame | None, found: Collection[str], even_with_om: bool
 ) -> tuple[list[Piece], bool]:
-    """What makes a large error with the method ``use``, the largest part first, and whether that is
-    only what the table's parameters leave, which OM should have taken away."""
+    """What makes a large error, the largest part first, and whether that is only what the table's
+    parameters leave, which OM should have taken away."""
     parts = () if budget is None or budget.empty else budgets.overall_pieces(budget, found)
     whole = [one for one in parts if one.label != budgets.REST]  # which has no name
     ranked = sorted(whole, key=lambda one: -one.share)
-    is_left = use == OM and bool(ranked) and budgets.PARAMETERS in ranked[0].label
+    is_left = even_with_om and bool(ranked) and budgets.PARAMETERS in ranked[0].label
     return ranked[is_left:], is_left
 
 
@@ -193,8 +195,8 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
     if len(cause) > 1:
         return say("line_of_group", n=len(cause), members=[*_members(cause)], sure=sure)
     (one,) = cause
-    some = _MOST_NAMED < len(one.trials) < len(everywhere)
-    where = where_seen(one.trials, everywhere)
+    some = _MOST_NAMED < len(one.trials) < len(everywhere) and not one.is_of_all
+    where = where_seen(one, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
     what = one.in_words(brief=True).removeprefix("of unknown cause: ")
     title = effect_title(one.effect)  # as the error budget calls it
@@ -215,7 +217,7 @@ def _members(cause: Sequence[Candidate]) -> Iterator[str]:
 
 def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """A cause, or a group of which one is there: what, how large, where and how probable."""
-    places, is_group = [where_seen(one.trials, everywhere) for one in cause], len(cause) > 1
+    places, is_group = [where_seen(one, everywhere) for one in cause], len(cause) > 1
     of_the_weight = cause[0].class_id == OF_THE_WEIGHT
     sure = []
     if words := probability_words(probability_of(cause)):
@@ -238,13 +240,15 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     )
 
 
-def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
-    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those analysed."""
-    names = [trial_label(stem) for stem in trials]
-    if len(everywhere) > 1 and set(trials) >= set(everywhere):
+def where_seen(one: Candidate, everywhere: Sequence[str]) -> str:
+    """``in all 4 recordings analysed`` or ``only in squat (run 3)``; ``everywhere``: those."""
+    if one.is_of_all:
+        return f"in the recordings of {one.persons} persons"
+    names = [trial_label(stem) for stem in one.trials]
+    if len(everywhere) > 1 and {*one.trials} >= {*everywhere}:
         every = "both" if len(everywhere) == 2 else f"all {len(everywhere)}"
-        return f"in {every} recordings"
-    return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
+        return f"in {every} recordings analysed"
+    return f"{'only ' if {*one.trials} < {*everywhere} else ''}in {listing(names)}"
 
 
 def probability_of(cause: Sequence[Candidate]) -> float:

@@ -246,6 +246,7 @@ def _summary(problem: Problem, estimate: Estimate) -> dict[str, object]:
     equations = problem.equations
     row: dict[str, object] = {"samples": equations.samples, "duration_s": equations.duration_s}
     row |= {"effective_samples": float(problem.noise.effective.sum()), "note": estimate.note}
+    row["decided"] = estimate.decided
     row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
     row["mass_factor_sd"] = float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg
     names = [f"rms_{name}" for name in WRENCH]

@@ -136,7 +136,7 @@ def _contacts(
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
-    feet = foot_contacts(own, rate_hz, plates, recording.n_frames)
+    feet = foot_contacts(own, rate_hz, plates, recording.n_frames, recording.time0_s)
     intervals = momentum_mass.intervals_of(markers, feet.total_N, feet.surely_measured, rate_hz)
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
     alone = momentum_mass.intervals_alone(markers, feet, plates, rate_hz)

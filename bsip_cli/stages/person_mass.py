@@ -19,6 +19,7 @@ from bsip_cli.stages.frames import load_words
 from bsip_cli.study.study import Trial
 
 UNKNOWN, PLATES, TABLE = "unknown", "plates", "participants.tsv"
+ENTRY = "the recording's own entry"
 VAGUE_PERCENT = 50.0  # half of an interval that still shows pounds to be no kilograms
 
 
@@ -46,7 +47,7 @@ def stated_mass(unit: Unit, *facts: dict[str, Any]) -> StatedMass | None:
     if unit.person.mass_kg is not None:
         return StatedMass(unit.person.mass_kg, TABLE)
     known = [one["stated_mass_kg"] for one in facts if one.get("stated_mass_kg") is not None]
-    return StatedMass(known[0], "the recording's own entry") if known else None
+    return StatedMass(known[0], ENTRY) if known else None
 
 
 def compared(

@@ -42,4 +42,5 @@ def run(unit: Unit) -> None:
     values = np.array([inertia.readable() for inertia in prior.inertias])
     table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))
     table[list(spread_names())] = spreads
-    unit.write("regression", table.assign(note=list(result.notes)))
+    outside = {"outside": strays.outside}
+    unit.write("regression", table.assign(note=list(result.notes)), outside)

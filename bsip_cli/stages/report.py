@@ -16,7 +16,15 @@ from bsip_cli.report import cohort_record as cohort
 from bsip_cli.report import records
 from bsip_cli.report.blocks import FILES, Document, Grid, Light, Picture, render
 from bsip_cli.report.participant import participant_document
-from bsip_cli.report.recordings import large_finding, light_for, must_wait, shown_of, use_now
+from bsip_cli.report.recordings import (
+    large_finding,
+    light_for,
+    measured_of,
+    not_yet,
+    use_now,
+    use_said,
+    use_words,
+)
 from bsip_cli.report.words import ROLES, listing, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
@@ -41,8 +49,9 @@ def run(unit: Unit) -> None:
     light = light_for(record)
     unit.say(f"{light.title}. {light.text}".rstrip())
     facts: dict[str, Any] = {"light": asdict(light), "large": large_finding(record)}
-    shown = {one.name: size for one, size in shown_of(record).items() if np.isfinite(size)}
-    facts |= {"first": must_wait(record), "use": use_now(record), "errors": shown}
+    shown = {one.name: size for one, size in measured_of(record).items() if np.isfinite(size)}
+    facts |= {"method": use_now(record), "use": f"{use_words(record)}{not_yet(record)}"}
+    facts |= {"said": use_said(record), "errors": shown}
     unit.write("report-files", rows, facts=facts)
 
 
@@ -71,6 +80,7 @@ def record_of(unit: Unit) -> records.ParticipantRecord:
     return records.ParticipantRecord(
         id=person,
         facts=unit.read("person").iloc[0],
+        outside=unit.facts("regression").get("outside", ""),
         **{kind: unit.read(kind) for kind in ("bsip", "excitation", "identification")},
         body=person_of(unit),
         trials=tuple(_trial_record(unit, trial, usable) for trial in trials),

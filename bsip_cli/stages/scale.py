@@ -19,7 +19,7 @@ from bsip_cli.recordings.scene import Stature, stature
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words, without_side
 from bsip_cli.stages.frames import XYZ, columns, markers_from, ordered_markers
-from bsip_cli.stages.person_mass import person_mass
+from bsip_cli.stages.person_mass import ENTRY, TABLE, person_mass
 from bsip_cli.study.study import Trial
 
 _QUIET_S = 1.0
@@ -74,7 +74,9 @@ def run(unit: Unit) -> None:
     # how the markers' height differs from the stated one, which ingest has said
     fault = statures.against(height_m) if statures is not None and height_m is not None else None
     row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
+    of_height = TABLE if unit.person.height_m is not None else ENTRY
     row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
+    row["height_source"] = of_height if height_m is not None else "markers"
     row |= {"height_note": "; ".join((fault[0], fault[2])) if fault else ""}
     row |= {"anterior_x": ahead[0], "anterior_y": ahead[1]}
     row |= {"calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m()}

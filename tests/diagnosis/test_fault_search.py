@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from bsip_cli.diagnosis import fault_search
 from bsip_cli.diagnosis.fault_model import Hypothesis, corrected, fitted
-from bsip_cli.diagnosis.fault_scores import library_of, limits_of
+from bsip_cli.diagnosis.fault_scores import library_of, limits_of, smallest
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, unevenness
@@ -102,6 +103,20 @@ def test_the_plate_that_reads_too_much_is_named(size):
     wrong = with_effect(movement(4), EFFECTS["plate_gain"], "1 fz", size)
     (one,) = told(found_in(wrong, asked=CATALOGUE))
     assert (one.effect, one.target) == ("plate_gain", "1 fz")
+
+
+def test_a_group_holds_95_per_cent_of_all_and_not_of_what_is_there(monkeypatch):
+    """Where a fault is there with 96 %, so do its candidates together."""
+    among: list[float] = []
+
+    def smallest_of(shares, least):
+        among.append(sum(shares.values()))
+        return smallest(shares, least)
+
+    monkeypatch.setattr(fault_search, "expit", lambda log_odds: 0.96)
+    monkeypatch.setattr(fault_search, "smallest", smallest_of)
+    found_in(late(movement(1), 0.012))
+    assert among and among == pytest.approx([0.96] * len(among))
 
 
 def test_what_looks_alike_is_a_group_that_holds_the_truth():

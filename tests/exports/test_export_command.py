@@ -65,10 +65,11 @@ def readable(body: IdentifiedPerson) -> np.ndarray:
 def write_choice(made: Results, participant: str, use: str = "OM") -> None:
     """As `choose` would, from the identification that is there."""
     source = made.artifact("identification", participant)
-    write_artifact(source, "identification", empty_table("identification"), NOTES)
+    table = empty_table("identification")
+    write_artifact(source, "identification", table, NOTES)
     names = column_names("choice")
     row = dict.fromkeys(names, 0.5) | {"movement": "all", "use": use, "trials": 3}
-    frame = pd.DataFrame([row | {"data": "whole_trials", "sentence": "Use OM: it errs less."}])
+    frame = pd.DataFrame([row | {"data": "whole_trials"}])
     notes = NOTES | {"made_by": {"inputs": {source.name: file_hash(source)}}}
     write_artifact(made.artifact("choice", participant), "choice", frame, notes)
 
@@ -115,7 +116,7 @@ def test_writes_every_format_of_everybody(results):
     wanted = {f"{s}/export/{s}_OM{e}" for s in ("sub-01", "sub-02") for e in ENDINGS}
     assert results.files() == wanted
     why, first, *_, summary = done.stderr.splitlines()
-    assert why == "export: sub-01: Use OM: it errs less."
+    assert why.startswith("export: sub-01: By errors so far, OM: in 3")
     assert first.startswith(f"export: sub-01: {results.out / 'sub-01' / 'export'}: sub-01_OM.urdf")
     assert summary == f"bsip export: 2 done; results in {results.out}"
 
@@ -142,6 +143,13 @@ def test_the_choice_is_the_default_and_must_be_of_this_identification(results):
     only = ("--participant", "sub-01", "--format", "csv")
     assert results.call(*only).returncode == 0
     assert results.files() == {"sub-01/export/sub-01_RM.csv"}
+    choice = results.artifact("choice")
+    notes = {"made_by": {"inputs": {choice.name: file_hash(choice)}}}
+    notes["facts"] = {"method": "OM", "said": "Use OM for now."}
+    page = empty_table("report-files")
+    write_artifact(results.artifact("report-files"), "report-files", page, NOTES | notes)
+    done = results.call(*only)  # as the page says
+    assert "sub-01: Use OM for now." in done.stderr and len(results.files()) == 2
     write_artifact(
         results.artifact("identification"),
         "identification",

@@ -68,11 +68,13 @@ def test_a_ghost_of_a_second_is_a_jump_and_not_two_slips():
 
 
 def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
-    """Other slips of that marker in that frame stay what they are."""
+    """Other slips of that marker at that time are one, as large as all of them."""
     there, back = np.array([0.03, 0.0, 0.0]), np.array([-0.03, 0.0, 0.0])
-    times = ((START, there), (STOP, np.array([0.0, 0.03, 0.0])), (STOP, back))
+    parts = ((STOP, np.array([0.0, 0.03, 0.0])), (STOP + 2, np.array([0.0, 0.0, 0.04])))
+    times = ((START, there), *parts, (STOP, back))
     slips = [marker_evidence._Slip(0, frame, vector, 9.0) for frame, vector in times]
     search = SimpleNamespace(
+        frames=5,
         left=None,
         changes=lambda: {0: SimpleNamespace(z=9.0)} if slips else {},
         source=lambda *_: (slips.pop(0), None),
@@ -82,6 +84,7 @@ def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
     times_s, markers, _ = recording(2)
     events, _ = marker_evidence.slips(fitted(markers, times_s), np.zeros(0))
     assert [(one.kind, round(one.start_s, 1)) for one in events] == [("jump", 3.2), ("slip", 3.5)]
+    assert events[1].size_m == pytest.approx(0.05)
 
 
 def test_a_jump_in_a_filled_gap_says_so_and_a_filled_slip_is_none():
@@ -100,7 +103,16 @@ def test_an_offset_of_25_mm(label):
     assert (event.kind, event.marker) == ("offset", label)
     assert (event.start_s, event.end_s) == pytest.approx((0.0, 7.98))
     assert event.size_m == pytest.approx(0.025, abs=0.006)
-    assert "throughout the trial" in event.sentence
+    assert event.sentence.endswith("throughout the trial")
+
+
+def test_an_offset_says_how_rarely_it_is_seen_and_that_it_may_be_another_marker():
+    times, markers = moved(3, "RTEM", 0.25, slice(None))
+    markers[100:, MARKERS.index("RTEM")] = np.nan
+    event = only(events_of(times, markers))
+    assert (
+        event.kind == "offset" and "the trial (seen in 25 % of it); probably another" in event.what
+    )
 
 
 @pytest.mark.parametrize("label", ["RMT2", "LCAL"])
@@ -148,7 +160,7 @@ def test_summaries_gather_the_jumps_of_a_marker_and_count_the_rest():
         "C7 offsets",
         "T10 offsets",
         "IJ slips",
-        "and 1 more, see marker-events",
+        "and 1 more, in the report",
     ]
     assert summaries(events, 9)[-1] == "RCAL jumps 4 times, by up to 13 mm, first at 1.00 s"
     assert summaries([], 3) == []

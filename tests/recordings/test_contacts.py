@@ -57,8 +57,8 @@ def _read_as(wrench: np.ndarray, corners: np.ndarray | None) -> Plate:
     return Plate("1", wrench, corners, np.isfinite(wrench).all(axis=1))
 
 
-def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None):
-    feet = foot_contacts({"l": left, "r": right}, RATE_HZ, plates, N)
+def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None, time0_s=0.0):
+    feet = foot_contacts({"l": left, "r": right}, RATE_HZ, plates, N, time0_s)
     trunk = _trunk() if trunk is None else trunk
     return contact_windows(feet, trunk, mass_kg, RATE_HZ, stands_kg)
 
@@ -74,7 +74,10 @@ def test_a_foot_beside_the_plate_is_not():
     force = np.where(np.arange(N) < 100, 0.8 * WEIGHT_N, WEIGHT_N)
     result = _windows(_foot(0.1), _foot(0.8, lift), [_plate(force)])
     assert not result.valid[:95].any() and result.valid[105:].all()
-    assert any("right foot" in finding.subject for finding in result.reasons)
+    (reason,) = (one for one in result.reasons if "right foot" in one.subject)
+    assert reason.found.endswith(": 0.00 to 0.98 s")
+    late = _windows(_foot(0.1), _foot(0.8, lift), [_plate(force)], time0_s=1.24)
+    assert [one.found[-15:] for one in late.reasons] == [" 1.24 to 2.22 s"]  # the file's clock
     assert result.on_ground["r"][:95].all() and not result.on_plate["r"].any()
 
 

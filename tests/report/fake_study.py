@@ -18,6 +18,7 @@ from bsip_cli.report.blocks import Document, Picture
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import bsip_table
 from bsip_cli.stages.joints import peaks_of
+from bsip_cli.stages.person_mass import TABLE
 from bsip_cli.stages.scale import _marker_table, _skeleton_table
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Participant, Study, Trial
@@ -93,6 +94,7 @@ class Artifacts:
 
     def write_all(self) -> Artifacts:
         self.write("person", self.facts())
+        self.write("regression", empty_table("regression"))
         self.write("skeleton", _skeleton_table(self.skeleton, SAME, SAME))
         self.write("marker-positions", self.markers())
         self.write("bsip", self.bsip())
@@ -130,9 +132,9 @@ class Artifacts:
     def facts(self) -> pd.DataFrame:
         stem = self.person.trials[0].stem
         return frame(
-            "sex mass_kg mass_source plate_mass_kg mass_note height_m height_note anterior_x "
-            "anterior_y calibration_trial marker_rms_m",
-            ("M", MASS_KG, "participants.tsv", 63.1, "", 1.63, "", 1.0, 0.0, stem, 0.0067),
+            "sex mass_kg mass_source plate_mass_kg mass_note height_m height_source height_note "
+            "anterior_x anterior_y calibration_trial marker_rms_m",
+            ("M", MASS_KG, TABLE, 63.1, "", 1.63, TABLE, "", 1.0, 0.0, stem, 0.0067),
         )
 
     def markers(self) -> pd.DataFrame:
@@ -162,7 +164,7 @@ class Artifacts:
         )
         known = {"trials": self.person.trials[1].stem, "duration_s": 13.5, "samples": 1400}
         known |= {"condition_number": 812.0, "mass_factor": MASS_FACTOR, "mass_factor_sd": 0.002}
-        known |= {"rare": False, "farthest": "the head", "rank": 128}
+        known |= {"rare": False, "farthest": "the head", "rank": 128, "decided": 9.2}
         return filled("identification", table.assign(**known))
 
     # --- trial ------------------------------------------------------------------------------
@@ -285,8 +287,8 @@ def choice() -> pd.DataFrame:
     known |= {"trials": 2, "data": "whole_trials"}
     return pd.DataFrame(
         [
-            {"movement": "all", "use": OM, "sentence": "Use OM: it errs less.", **known},
-            {"movement": "basketball", "use": RM, "sentence": f"mind {EVIL}", **known},
+            {"movement": "all", "use": OM, **known},
+            {"movement": "basketball", "use": RM, **known},
         ]
     )
 

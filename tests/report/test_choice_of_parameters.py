@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 
 from bsip_cli.diagnosis.support import Support
+from bsip_cli.report.errors import use_sentence
 from bsip_cli.stages import choose
-from bsip_cli.statistics.choice import COMPONENTS, Difference
+from bsip_cli.statistics.choice import COMPONENTS
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
@@ -24,6 +25,9 @@ RAIL = asdict(
     )
 )
 SEEN, UNSEEN = "sequence", "walking"
+IDENTIFIED = pd.DataFrame(
+    {"method": [RM_MASS, OM], "rare": False, "mass_factor": 0.96, "mass_factor_sd": 0.02}
+)
 
 
 def fit(errors: dict[str, float], data: str) -> pd.DataFrame:
@@ -49,7 +53,7 @@ def chosen(trials: dict[str, dict], *, rare=False, contacts=(), identified=True)
     }
     data = {name: "held_out" if not own[name] or rare is None else "identification" for name in own}
     tables = {
-        "identification": pd.DataFrame({"method": [RM_MASS, OM], "rare": [False, bool(rare)]}),
+        "identification": IDENTIFIED.assign(rare=[False, bool(rare)]),
         "used-blocks": pd.DataFrame({"trial": [name for name in own if own[name]]}),
     }
     if not identified:
@@ -92,36 +96,22 @@ def test_where_om_fails_another_is_said():
     good, bad = {"steps_1": ERRORS, "steps_2": worse(0.52)}, {"run_1": worse(1.5)}
     table = chosen(good | bad | {"run_2": worse(1.6)})
     assert dict(table["use"]) == {"all": RM_MASS, "steps": OM, "run": RM_MASS}
-    assert table.loc["all", "sentence"].startswith(
-        "Use RM+mass (for steps: OM): in 4 trials that OM"
-    )
-    assert table.loc["run", "sentence"].startswith("Use RM+mass for run: in 2 trials that OM")
-
-
-def test_the_sentence_says_newtons_and_what_decides():
-    """Each of the three force components errs by 1, 0.9 and 0.5 N."""
-    large = {method: 10 * error for method, error in ERRORS.items()}
-    two = chosen({"squats_1": large, "squats_2": worse(0.55) | {RM: 10, RM_MASS: 9, OM: 5.5}})
-    assert two.loc["squats", "sentence"] == (
-        "Use OM for squats: in 2 trials that OM had not seen the ground force errs by 9 N with the "
-        "identified parameters (OM), by 16 N with the table's scaled to the measured weight "
-        "(RM+mass), by 17 N with the table's own (RM). Over forces, moments and centre of pressure "
-        "together OM errs 43 to 52 % less than RM and 36 to 47 % less than RM+mass."
+    said = use_sentence(table, IDENTIFIED)
+    assert said.startswith(
+        "Use OM for steps, else RM+mass (the table times 0.960 ± 0.04): in 2 other recordings its "
     )
 
 
-@pytest.mark.parametrize(
-    ("log", "error", "words"),
-    [
-        (np.log(0.8), 0.05, "16 to 24 % less than RM"),
-        (np.log(1.2), 0.05, "14 to 26 % more than RM"),
-        (0.0, 0.05, "between 5 % less and 5 % more than RM"),
-        (0.001, 0.003, "as much as RM"),
-        (np.log(0.8), np.nan, "20 % less than RM (too few independent samples for an interval)"),
-    ],
-)
-def test_a_comparison_in_words(log, error, words):
-    assert choose._compared(RM, Difference(log, error)) == words
+def test_the_numbers_are_of_the_recordings_for_which_the_method_is_to_be_used():
+    """Not of the run, where another is."""
+    good = {f"{task}_{k}": worse(0.5 + 0.01 * k) for task in ("squats", "steps") for k in (1, 2)}
+    table = chosen(good | {"run_1": worse(0.99), "run_2": worse(1.01)})
+    assert table.loc["all", "use"] == OM and table.loc["run", "use"] == RM_MASS
+    said = use_sentence(table, IDENTIFIED)
+    assert "else OM: in 4 other recordings its error is 49 % smaller than RM's" in said
+    only = table.assign(use=[OM, RM, RM, RM])
+    said = use_sentence(only, IDENTIFIED)
+    assert "else OM: in 6 other recordings together OM's" in said
 
 
 def test_the_trials_that_identified_do_not_judge():
@@ -132,14 +122,14 @@ def test_the_trials_that_identified_do_not_judge():
 def test_held_out_seconds_count_only_where_there_is_no_other_trial_and_it_is_said():
     alone = chosen({SEEN: ERRORS}, rare=None)
     assert list(alone["data"]) == ["held_out", "held_out"] and set(alone["use"]) == {OM}
-    assert "in seconds held out of the trials that identified" in alone.loc["all", "sentence"]
+    assert "in seconds of 1 recording that were held out" in use_sentence(alone, IDENTIFIED)
     assert list(chosen({SEEN: ERRORS, UNSEEN: ERRORS}, rare=None).index) == ["all", UNSEEN]
 
 
 def test_a_marked_body_is_never_used_and_it_is_said():
     table = chosen({UNSEEN: ERRORS, "squat": ERRORS}, rare=True)
     assert OM not in set(table["use"])
-    assert "fewer than 1 in 100 people" in table.loc["all", "sentence"]
+    assert "fewer than 1 in 100 people" in use_sentence(table, IDENTIFIED.assign(rare=True))
 
 
 def test_a_hand_on_a_rail_judges_nobody():
@@ -149,4 +139,4 @@ def test_a_hand_on_a_rail_judges_nobody():
 
 def test_without_identification_the_table_stands():
     table = chosen({UNSEEN: {RM: 1.0}}, identified=False)
-    assert list(table["use"]) == [RM] and "nothing was identified" in table["sentence"].iloc[0]
+    assert list(table["use"]) == [RM] and table["data"].iloc[0] == "none"

@@ -96,6 +96,7 @@ def test_the_first_page_has_a_dot_per_person(reports, page):
     assert list(numbers["participant"]) == ["sub-01", "sub-02", "sub-03"]
     values = reports.unit("report").read("values", table=["table4"], variable=["grf_vertical"])
     assert "use RM for 1" in front  # as its own page says: OM of sub-01 has to wait
+    assert "OM of 2 of 3 participants; the data decide 9 of their 150 parameters" in front
     own = values[(values["participant"] == "sub-01") & (values["method"] == "RM")]
     (held_out,) = own.loc[own["data"] == "held_out", "value"]
     assert numbers["vertical_force_percent_bw"][0] == pytest.approx(held_out, rel=1e-4)

@@ -68,7 +68,8 @@ def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     assert text.startswith("2 findings. Searched: 2 recordings.")
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
+        "both recordings analysed. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the "
+        in text
     )
     assert text.count(EFFECT_WORDS["plate_rotation"].sentence) == 1  # plate_zero's is the same
     assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].sentence}" in text
@@ -101,13 +102,13 @@ def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
 
 def test_how_sure_is_a_probability_and_what_it_explains(found):
     text = text_of(found.assign(gain_ci_low=-1.0), detection(TRIALS))
-    assert (
-        "Probability 99.5 %; explains 8.0 % (−1.0 to 12.0 %: too few seconds to be sure) of" in text
-    )
+    assert "Probability 99.5 %; explains an unsure part (−1.0 to 12.0 %)" in text
     sure = text_of(found.assign(probability=1 - 1e-9, gain_ci_high=140.0), detection(TRIALS))
     assert "Probability over 99.9 %; explains 8.0 % (4.0 to 100.0 %) of" in sure
     told = found[found["rank"] == 1].assign(probability=np.nan, gain_percent=np.nan)
-    assert cause_text(causes_of(candidates_of(told))[0], TRIALS).endswith("in both recordings.")
+    assert cause_text(causes_of(candidates_of(told))[0], TRIALS).endswith(
+        "in both recordings analysed."
+    )
 
 
 def test_probabilities_have_digits_where_these_say_something():
@@ -134,7 +135,7 @@ def test_members_of_a_group_may_be_of_different_recordings(found):
     )
     assert "cannot distinguish: (a) channel fz has an offset" in text
     assert "8.8 to 10.8 N), only in basketball (run 1), probability 58.0 %; (b)" in text
-    assert "0.90 to 1.10 kg), in both recordings, probability 38.0 %." in text
+    assert "0.90 to 1.10 kg), in both recordings analysed, probability 38.0 %." in text
 
 
 def test_what_quiet_standing_tells_gives_its_advice_once(found):

@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.blocks import Light, Links, Numbered, Picture
+from bsip_cli.report.blocks import Bullets, Light, Links, Numbered, Picture, first_of
+from bsip_cli.report.causes import candidates_of
 from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.first_page import front, who
 from bsip_cli.report.joints import joint_blocks
-from bsip_cli.report.participant import participant_document
+from bsip_cli.report.participant import nearest, participant_document
 from bsip_cli.report.recordings import large_finding, light_for
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
@@ -122,27 +123,27 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "2 findings; no large error" in first
     assert (
         "Force plate turned or tilted: plate 1 is turned by +2.0 degrees (about the vertical: 95 % "
-        "interval 1.75 to 2.26°), in both recordings, a usual size (1 to 4°); changes the left "
-        "knee's moment by 9 % of its peak; probability 99.5 %." in first
+        "interval 1.75 to 2.26°), in both recordings analysed, a usual size (1 to 4°); changes "
+        "the left knee's moment by 9 % of its peak; probability 99.5 %." in first
     )
     assert "One of 2 causes that look alike here: " in first and "Together 96.0 %." in first
-    assert "the errors? ● RM, ○ OM (basketball: RM) (not yet)" in first
+    assert "the errors? ● RM, ○ OM (not yet)" in first
     assert "What makes the squared error of forces (not of joint moments) with RM:" in first
     assert "the table's segment parameters 70 %" in first  # OM, which corrects these, has to wait
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm (good)" in first
+    assert "RMS of what OM had not seen, usable or not: good to" in first
     corrected = "sequence (finding 1); basketball (findings 1 and"
     assert f"Use after acting on the finding: {corrected}" in first
     assert (
         "Use RM for now: OM comes from sequence, unusable as recorded. Correct it or choose "
-        "another (study.toml: roles); run again. Then use RM for basketball, else OM: in both "
-        "other recordings OM's error is 34 to 46 % smaller than RM's," in first
+        "another (study.toml: roles); run again. What to do next" in first
     )
-    assert f"Files {FILE} Parameters RM (regression method): a table;" in first
-    assert "OM (optimisation method): fitted to sequence" in first
+    assert f"Files {FILE} Parameters RM: a table (regression method);" in first
+    assert "OM: fitted to sequence (optimisation method), data decide 9 of 150 parameters" in first
     assert f"sequence and basketball; date unknown Files {FILE}" in first
     assert f"Report {date.today().isoformat()}, bsip 0" in first
-    assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
+    assert "Finding 1: Check, then correct the forces in the lab or in files (bsip export)" in first
 
 
 def test_it_says_when_as_the_study_or_else_the_files_say(record):
@@ -157,6 +158,44 @@ def test_it_says_when_as_the_study_or_else_the_files_say(record):
     assert said(files) == "recorded 2019-05-24"
     study = replace(files, recorded_on=("2024-03-02", "2024-03-01"))
     assert said(study) == "recorded 2024-03-01 to 2024-03-02"
+
+
+def test_what_nobody_has_stated_or_checked_is_said_first(record):
+    assert "Assumed" not in dict(who(record))
+    facts = record.facts.copy()
+    facts["sex"], facts["height_source"] = "other", "markers"
+    row = record.trials[0].quality.iloc[0].copy()
+    row["check"], row["level"] = "marker_set", "info"
+    row["found"], row["action"] = "mine", "Guessed from the labels of a.c3d, not checked"
+    quality = pd.concat([record.trials[0].quality, row.to_frame().T])
+    trials = (replace(record.trials[0], quality=quality), *record.trials[1:])
+    child = "1.33 m tall, and the table (RM) is of adults"
+    guessed = replace(
+        record, facts=facts, trials=trials, outside=f"{child}: should this be a child"
+    )
+    assert dict(who(guessed))["Assumed"] == (
+        "sex (not stated: mean of both tables); height (from the markers); marker set mine "
+        f"(Guessed from the labels of a.c3d, not checked); {child}"
+    )
+
+
+def test_what_was_found_is_not_among_what_was_not(record):
+    """In another recording, say; and what came near twice is there once."""
+    rejected = record.diagnosis[record.diagnosis["verdict"] == "rejected"].assign(class_id="")
+    one = rejected.head(1)
+    twice = pd.concat([one.assign(rank=80), one.assign(rank=81)])
+    (grid,) = nearest(candidates_of(twice))
+    assert len(grid.rows) == 1
+    both = pd.concat([twice, one.assign(rank=1, verdict="named")])
+    (said,) = nearest(candidates_of(both))
+    assert "No other fault" in said.text
+
+
+def test_long_lists_are_whole_in_a_file():
+    assert first_of(["a", "b"], 2, "warnings") == Bullets(("a", "b"))
+    grid = first_of(["a", "b", "c"], 2, "warnings")
+    assert grid.rows == (("a",), ("b",)) and list(grid.data["warnings"]) == ["a", "b", "c"]
+    assert grid.caption == "1 more:"
 
 
 def test_of_many_files_it_says_how_many_and_of_which_kind(record):
@@ -225,13 +264,12 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     assert (light.state, light.title) == ("large", "Large error even with OM")
     (finding,) = large_finding(large)
     assert finding.startswith(
-        "Large error with OM (basketball: RM): vertical force 5.5 %, most in sequence; cause "
-        "unknown: none of the"
+        "Large error with RM: vertical force 5.5 %, most in sequence; cause unknown: none of the"
     )
     (numbered,) = (block for block in front(large) if isinstance(block, Numbered))
     assert numbered.items == (finding,)
     assert light_for(large).text.startswith(
-        "Large with OM (identified): vertical force 5.5 % of body weight. None of the"
+        "Large with RM (table): vertical force 5.5 % of body weight. None of the"
     )
     *_, to_do = front(large)
     assert to_do.items[0] == (
@@ -254,21 +292,21 @@ def test_what_is_fine_is_to_be_used_as_it_is(record):
 def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(choice, record.identification)
-    assert said.startswith("Use RM (parameters of an anthropometric table)")
+    assert said.startswith("Use RM: OM is not clearly better")
     assert ": OM is not clearly better; in 2 other recordings its error is 5 % smaller to" in said
     one = use_sentence(record.choice[:1], record.identification)
-    assert one.startswith("Use OM (parameters identified from this person): in 2 other recordings")
+    assert one.startswith("Use OM: in 2 other recordings")
     assert "its error is 34 to 46 % smaller than RM's," in one
     held = use_sentence(record.choice.assign(data="held_out"), record.identification)
     held_out = (
-        ": in all seconds of 2 recordings that were held out OM's error is 34 to 46 % smaller"
+        ": in seconds of 2 recordings that were held out together OM's error is 34 to 46 % smaller"
     )
     assert held_out in held
     rare = record.identification.assign(rare=True)
     assert "Do not use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)
     said = use_sentence(alone, rare)
-    assert ": no recording is left to judge OM by. " in said and "Do not use OM" in said
+    assert "or no recording is left to judge it by. " in said and "Do not use OM" in said
 
 
 # --- sections -----------------------------------------------------------------------------------
@@ -292,8 +330,11 @@ def test_joint_moments_are_told_with_what_changes_them(record, text):
     changed = f"left knee extension most, by {number(largest['OM'], 1)} N m".replace(
         "by 8", "by +8"
     )
-    assert f"Identification (OM against RM) changes {changed}, 10 % of that joint's peak." in text
-    assert "The force plate turned or tilted changes left knee extension most" in text
+    assert (
+        f"as far as known: identification (OM against RM) changes {changed}, 10 % of that joint's "
+        "peak." in text
+    )
+    assert "known: the force plate turned or tilted changes left knee extension most" in text
     assert re.search(r"Left out of \w+ \(run 1\): both feet are on one plate: 3 frames\.", text)
 
 

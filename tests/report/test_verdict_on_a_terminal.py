@@ -53,10 +53,12 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     assert text.startswith("sub-01: 2 findings")
     flat = " ".join(text.split())
     assert " 1. Force plate turned or tilted: plate 1 is turned by +2.0 degrees" in flat
-    assert "and OM (identified) for all other movements" in flat
+    assert "Use " not in flat  # which the page says, that is not there
+    replace(reports, out=tmp_path).run("report", person)
+    assert "Use RM for now: OM comes from sequence" in " ".join("\n".join(shown(tmp_path)).split())
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
-    assert "Identification (OM against RM) changes" in " ".join(full.split())
+    assert "identification (OM against RM) changes" in " ".join(full.split())
 
 
 def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
@@ -71,7 +73,7 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     assert "sub-01: No fault found" in "\n".join(shown(tmp_path))  # no report, no yardstick
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert said.startswith("sub-01: Large error even with OM. Large with OM (identified): vertical")
+    assert said.startswith("sub-01: Large error even with OM. Large with RM (table): vertical")
     page = replace(reports, out=tmp_path).html("sub-01")
     assert "<strong>Large error even with OM</strong>" in page
 

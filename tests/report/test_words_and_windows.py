@@ -5,7 +5,7 @@ import pytest
 
 from bsip_cli.dynamics.lowpass import valid_intervals
 from bsip_cli.report.blocks import Document, Paragraph, render
-from bsip_cli.report.errors import Gain, gains_of, one_number_alone, pooled_errors
+from bsip_cli.report.errors import gains_of
 from bsip_cli.report.figures.canvas import middle_of_longest, plain, thinned, ticks
 from bsip_cli.report.figures.charts import Panel, curves
 from bsip_cli.report.words import (
@@ -126,25 +126,3 @@ def test_gains():
     assert set(gains) == {"fx", "fz", "my", "grf_vertical"}
     assert gains["my"].of == {"RM": 10.0, "RM+mass": 5.0, "OM": 6.0}
     assert (gains["grf_vertical"].unit, gains["grf_vertical"].of["RM"]) == ("% BW", 1.0)
-    means = pooled_errors([*gains.values(), *gains.values()], "fx")
-    assert means["OM"] / means["RM"] == pytest.approx(0.6)
-
-
-def test_every_frame_counts_once():
-    long = Gain("fx", "N", {"RM": 10.0, "OM": 8.0}, "long", 300, True)
-    short = Gain("fx", "N", {"RM": 20.0, "OM": 2.0}, "short", 100, True)
-    both = pooled_errors([long, short], "fx")
-    assert both["RM"] == pytest.approx(np.sqrt((3 * 10.0**2 + 20.0**2) / 4))
-    assert both["OM"] == pytest.approx(np.sqrt((3 * 8.0**2 + 2.0**2) / 4))
-
-
-@pytest.mark.parametrize(
-    ("rm_mass", "om", "says"),
-    [
-        (-0.7, -0.6, "gains nothing over that number"),
-        (-0.2, -0.6, "OM errs by 50 % less than RM+mass"),
-        (0.2, 0.1, "neither is better than the table"),
-    ],
-)
-def test_what_one_number_alone_does(rm_mass, om, says):
-    assert says in one_number_alone("force", rm_mass, om)

@@ -54,7 +54,7 @@ class GateLimits:
 
     believed_percent: float = 85.0
     corrected_percent: float = 95.0
-    balance_median_m: float = 0.011
+    balance_median_m: float = 0.024
     complete_percent: float = 15.0
     marker_noise_m: float = 0.001
     independent_numbers: float = 12.0
@@ -136,15 +136,13 @@ class Balance:
     """How the total wrenches of all trials of a session go with their bodies.
 
     gaps_m : of each trial, of the centre of mass from over the centre of pressure, movement taken
-    off, RMS; without trials in which nothing is known. movements_m : what was taken off, the rate
-    of the angular momentum over the weight, RMS. correlations : of force with motion, by
+    off, RMS; without trials in which nothing is known. correlations : of force with motion, by
     kind; numbers : how many independent ones they are of. sizes : of force over motion, logarithm,
     above the usual one, each with their correlation. turned : correlation of level forces that are
     turned or mirrored as suits them best.
     """
 
     gaps_m: tuple[float, ...] = ()
-    movements_m: tuple[float, ...] = ()
     correlations: Mapping[str, float] | None = None
     numbers: float = 0.0
     sizes: tuple[tuple[float, float], ...] = ()
@@ -158,7 +156,7 @@ class Balance:
         force, motion = some.wrench.copy(), some.rate
         force[:, 3:] -= _cross(some.place_m, force[:, :3])
         lean = force[:, 3:5] - motion[:, 3:5]
-        gaps_m, movements_m = map(some.level_m, (lean, motion[:, 3:5]))
+        lean2 = (lean**2).sum(axis=1)
         # The centre of mass is thought to be off by as much all through a trial: a gap, no motion.
         lift = force[:, 2]
         force[:, 3:5] -= (some.over(lean.T, lift) @ some.member * lift).T
@@ -173,8 +171,7 @@ class Balance:
             return float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
 
         return cls(
-            gaps_m,
-            movements_m,
+            tuple(np.sqrt(some.member @ lean2 / some.member.sum(axis=1)) / GRAVITY_M_S2),
             {kind: correlation(k) for kind, k in _KINDS.items()},
             some.numbers,
             tuple(
@@ -187,11 +184,9 @@ class Balance:
     def log_likelihood(self, limits: GateLimits) -> float:
         """How likely a person is so balanced and driven, logarithm.
 
-        Gaps in the plane are as Student's t with two degrees of freedom, whose median is its scale:
-        that of quiet stance, and as much as was taken off for movement.
+        Gaps in the plane are as Student's t with two degrees of freedom, whose median is its scale.
         """
-        usual = np.hypot(limits.balance_median_m, self.movements_m)
-        gaps = np.array(self.gaps_m) / usual
+        gaps = np.array(self.gaps_m) / limits.balance_median_m
         return float(-2.0 * np.log1p(gaps**2).sum()) + self.drive_log_likelihood()
 
     def drive_log_likelihood(self) -> float:
@@ -273,11 +268,6 @@ class _Complete:
             min(limits.independent_numbers, numbers),
         )
 
-    def level_m(self, moments: np.ndarray) -> tuple[float, ...]:
-        """RMS of level moments over the mass (n, 2) in each trial, over the weight."""
-        squares = self.member @ (moments**2).sum(axis=1) / self.member.sum(axis=1)
-        return tuple((np.sqrt(squares) / GRAVITY_M_S2).tolist())
-
     def over(self, values: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Of values (..., n) what goes with another signal (n,) in each trial, (..., trials)."""
         return np.asarray((values * other) @ self.member.T / (self.member @ other**2))
@@ -316,8 +306,7 @@ def turn_of_forces(
         ),
         (*places, len(some.member)),
     ]
-    usual2 = limits.balance_median_m**2 + np.square(some.level_m(some.rate[:, 3:5])).mean()
-    least = (0.0, 0.0, float(usual2))
+    least = (0.0, 0.0, limits.balance_median_m**2)
     weights, turn, total = [1.0, 1.0, 1.0], 1.0 + 0j, 0j
     for _ in range(_ROUNDS):
         total = sum(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.config import load_config
-from bsip_cli.recordings.body_motion import USUAL, Balance
+from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.hypothesis import Hypothesis
 from bsip_cli.recordings.plate_reading import ONE_ALONE, FrameChange, PlateReading
 from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
@@ -479,10 +479,3 @@ def test_nothing_of_a_table_is_the_whole_force_while_a_plate_left_out_bears():
     assert said.subject == "2" and said.level == "excluded"
     seen = assemble(opened(of_c3d()), left_out)  # where the feet tell
     assert seen.plates[0].usable.all()
-
-
-def test_out_of_balance_counts_for_more_in_quiet_stance_than_in_a_swing():
-    """56 mm, which a reversed moment of one plate makes."""
-    one_in_a_hundred = -4.6
-    stance, swing = (Balance((0.056,), (movement_m,)) for movement_m in (0.0, 0.05))
-    assert stance.log_likelihood(USUAL) < one_in_a_hundred < swing.log_likelihood(USUAL)

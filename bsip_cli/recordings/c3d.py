@@ -58,7 +58,7 @@ def open_c3d(path: Path) -> Opened:
         findings=(*about, *about_person, *about_samples),
         rotation_world_lab=rotation,
         forces_note="",
-        time0_s=content.first_frame / content.rate_hz,
+        time0_s=content.time0_s,
         stated=stated,
     )
     return Opened(recording, tuple(plates))

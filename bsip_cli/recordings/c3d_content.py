@@ -49,6 +49,11 @@ class Content:
     samples_per_frame: int
     findings: tuple[Finding, ...]
 
+    @property
+    def time0_s(self) -> float:
+        """Of the first frame."""
+        return self.first_frame / self.rate_hz
+
     def group(self, name: str) -> Group:
         return self.parameters.get(name, {})
 

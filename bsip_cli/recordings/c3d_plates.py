@@ -149,8 +149,7 @@ def _plate(
     rate_hz = content.rate_hz * content.samples_per_frame
     samples = check_samples(channels, counts, lift, rate_hz)
     source = replace(source, usable=samples.usable())
-    time0_s = content.first_frame / content.rate_hz
-    findings = sample_findings(description.name, samples, rate_hz, time0_s)
+    findings = sample_findings(description.name, samples, rate_hz, content.time0_s)
     group = content.group("FORCE_PLATFORM")
     baseline = _baseline(group, content.samples_per_frame, len(values))
     down = float(np.sign((rotation_world_lab @ description.rotation_lab_plate()[:, 2])[2]))

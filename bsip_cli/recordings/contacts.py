@@ -142,10 +142,8 @@ def contact_windows(
         unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
     if unexplained.any():
         loaded = feet.valid & (feet.total_N > TOUCHED_N)
-        cause = (
-            "a contact they do not measure (seat, box, hands, a plate that is not in the file) or, "
-        )
-        cause += "if brief, an impact that the markers do not follow"
+        cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file) "
+        cause += "or, if brief, an impact that the markers do not follow"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
             cause = f"the mass by which they are judged, {mass_kg:.1f} kg, is wrong, or something "
             cause += "bears the person all the time (a plate that is not in the file, a rail)"

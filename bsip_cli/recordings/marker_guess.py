@@ -15,6 +15,7 @@ import numpy as np
 from bsip_cli.body.joint_centres import breadth_m
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set, shipped_names
 from bsip_cli.errors import BadDataError
+from bsip_cli.files.templates import templates_in
 from bsip_cli.recordings.label_words import (
     Meaning,
     are_numbered,
@@ -372,15 +373,7 @@ def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, nam
     What is not printable is left out; ``source`` names the recording, ``name`` the file to be
     written. A segment without markers is a comment that shows how to fill it in.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = templates_in(Path(__file__).parent)
     filters = (_printable, _quoted, _key, _listed, _wrapped)
     environment.filters |= {one.__name__[1:]: one for one in filters}
     return environment.get_template("marker_set.toml.j2").render(

@@ -125,8 +125,9 @@ class SessionReading:
 
     @property
     def is_as_stated(self) -> bool:
-        """Nothing is corrected but which way the forces push."""
-        return not self.frame.moved and not any(x.reading.repairs() for x in self.plates.values())
+        """Nothing is corrected but which way the forces push, and an outline."""
+        left = {replace(x.reading, sign=1, half_size_m=None) for x in self.plates.values()}
+        return not self.frame.moved and left <= {PlateReading()}
 
     def units_of(self, trial: str) -> tuple[float, float] | None:
         """Scales of moments and points, where they are not those of the session's other trials."""
@@ -270,8 +271,7 @@ def _odd_trials(
 ) -> list[str]:
     """The few trials without which forces that together are no person's are one's: half of them
     at most, which are nobody's even ``alone``, or fewer, which alone are understood alike and
-    otherwise than the others; none if it may be these or those. Half of them cannot be against a
-    correction: that of all others would be no session's."""
+    otherwise than the others; none if it may be these or those, nor half against a correction."""
     some = list(alone)
     own = {k: (one.frame, [x.reading for x in one.plates.values()]) for k, one in alone.items()}
     refused = [k for k, one in alone.items() if one.is_refused]
@@ -281,15 +281,12 @@ def _odd_trials(
     few = [list(one) for one in dict.fromkeys(map(tuple, alike)) if 2 * len(one) < len(some)]
     may_be = [refused] if refused else few
     rest = [[one for k, one in enumerate(trials) if k not in gone] for gone in may_be]
-    found = {
-        k: session_reading(others, limits)
-        for k, others in enumerate(rest)
-        if any(one.sources for one in others)
-    }
     clear = [
-        may_be[k]
-        for k, one in found.items()
-        if not one.refusals() and (one.is_as_stated or 2 * len(may_be[k]) < len(some))
+        gone
+        for gone, others in zip(may_be, rest, strict=True)
+        if any(one.sources for one in others)
+        and not (found := session_reading(others, limits)).refusals()
+        and (found.is_as_stated or 2 * len(gone) < len(some))
     ]
     return [trials[k].name for k in clear[0]] if len(clear) == 1 else []
 

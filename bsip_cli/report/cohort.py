@@ -59,6 +59,7 @@ from bsip_cli.report.words import (
     trial_label,
     true_minus,
 )
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
 _MOST = 6  # sentences of a kind on the first page
@@ -95,7 +96,11 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     ends = dict.fromkeys(
         number(x, 0) for x in (min(decided, default=np.nan), max(decided, default=np.nan))
     )
-    data = f"; the data decide {' to '.join(ends)} of their 150 parameters" if decided else ""
+    data = (
+        f"; the data decide {' to '.join(ends)} of their {10 * len(SEGMENTS)} parameters"
+        if decided
+        else ""
+    )
     people = ("Participants", f"OM of {len(done)} of {everyone}{data}")
     use = ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)")
     yield Terms((people, use, ("Software", f"bsip {software}")))

@@ -157,6 +157,13 @@ def test_which_of_two_is_odd_is_not_known():
     assert reading(trials).odd == {}
 
 
+def test_one_of_two_is_no_reason_to_correct_the_session():
+    trials = [named(opened(exchanged(of_c3d())), "a"), named(far_away(), "b")]
+    alone, both = reading(trials[:1]), reading(trials)
+    assert not alone.refusals() and not alone.is_as_stated
+    assert both.odd == {} and both.is_refused
+
+
 def test_one_trial_with_left_and_right_exchanged_is_refused():
     trials = [named(opened(of_table()), f"t{k}") for k in range(3)]
     sides = str.maketrans("LR", "RL")

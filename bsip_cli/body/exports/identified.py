@@ -16,6 +16,7 @@ from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
 from bsip_cli.body.person import Person
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import read_toml, shipped
+from bsip_cli.files.templates import templates_in
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -165,15 +166,7 @@ def rendered(template: str, **known: Any) -> str:
 
 @cache
 def _templates() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy
-
-    made = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    made = templates_in(Path(__file__).parent / "templates")
     made.filters |= {"numbers": numbers, "comment": xml_comment, "quaternion": _about_x}
     made.filters["xml"] = lambda text: escape(text, {'"': "&quot;"})
     return made

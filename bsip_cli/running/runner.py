@@ -254,7 +254,10 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         if not why and not force:
             return Outcome(stage.name, unit.name, "fresh")
         said = [f"{changed}: made again" for changed in was_changed(unit)]
+        before = _files_beside(unit)
         stage.run(unit)
+        for name in before - _files_beside(unit):  # a figure of what is no more to be said
+            remove(unit.out / name)
         remove(unit.refusal_path())
     except Exception as error:  # noqa: BLE001  a bug in one unit leaves the others standing
         return _written_down(unit, error)
@@ -426,14 +429,28 @@ def _names(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
 
 
 def _changed_files(unit: Unit, kind: str) -> list[str]:
-    if SCHEMAS[kind].column("sha256") is None:
-        return []
-    listed = read_artifact(unit.path(kind), kind)
     return [
         name
-        for name, known in zip(listed["file"], listed["sha256"], strict=True)
+        for name, known in _files_listed_in(unit, kind).items()
         if not (path := unit.out / name).is_file() or fingerprints.file_hash(path) != known
     ]
+
+
+def _files_beside(unit: Unit) -> set[str]:
+    """Files that the unit has written next to its artifacts, as far as those can be read."""
+    found = set()
+    for kind in unit.stage.writes:
+        with suppress(errors.BadDataError):  # `was_changed` says so
+            found |= _files_listed_in(unit, kind).keys()
+    return found
+
+
+def _files_listed_in(unit: Unit, kind: str) -> dict[str, str]:
+    """By their paths below the folder of results, with their hashes."""
+    if SCHEMAS[kind].column("sha256") is None or not (path := unit.path(kind)).is_file():
+        return {}
+    listed = read_artifact(path, kind)
+    return dict(zip(listed["file"], listed["sha256"], strict=True))
 
 
 def outdated(path: Path) -> str:

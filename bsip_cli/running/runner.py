@@ -438,7 +438,7 @@ def _changed_files(unit: Unit, kind: str) -> list[str]:
 
 def _files_beside(unit: Unit) -> set[str]:
     """Files that the unit has written next to its artifacts, as far as those can be read."""
-    found = set()
+    found: set[str] = set()
     for kind in unit.stage.writes:
         with suppress(errors.BadDataError):  # `was_changed` says so
             found |= _files_listed_in(unit, kind).keys()

@@ -13,6 +13,7 @@ from bsip_cli.recordings.analog import long_runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.trunk_motion import in_flight
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Feet, is_inside
 
 _NOTICED_N = 1.0
 _WINDOW_S = 0.2
@@ -38,7 +39,8 @@ def without_zeros(
     if recording.plates:
         flight = in_flight(recording, len(recording.plates[0].usable))
     for plate in recording.plates:
-        unloaded = unloaded_samples(plate, rate_hz, nobody_near(recording, plate), flight)
+        near = nobody_near(recording, plate), foot_rests(recording, plate)
+        unloaded = unloaded_samples(plate, rate_hz, *near, flight)
         if unloaded.any():
             zeros[plate.name] = np.median(plate.wrench[unloaded], axis=0).tolist()
         zeroed, finding = subtract_zero(plate, unloaded, rate_hz)
@@ -51,6 +53,7 @@ def unloaded_samples(
     plate: Plate,
     rate_hz: float,
     surely_free: np.ndarray | None = None,
+    rests: np.ndarray | None = None,
     flight: np.ndarray | None = None,
 ) -> np.ndarray:
     """Where a plate bears nobody, (n_analog,) bool: intervals that are long, low and quiet in the
@@ -58,7 +61,8 @@ def unloaded_samples(
     which it reads the same throughout.
 
     What it reads there is bounded unless ``surely_free`` (n_analog,) bool says that nobody is near,
-    or the plate reads a steady pull: it was set to zero under the person.
+    or the plate reads a steady pull: it was set to zero under the person. Where a foot ``rests``
+    on it (n_analog,) bool, a light load is the foot's: of who sits, or stands on the other leg.
     """
     if (pulled := steady_pull(plate, rate_hz)).any():
         return pulled
@@ -72,6 +76,8 @@ def unloaded_samples(
         level = float(np.median(mean[free]))
         if abs(level) >= _LARGEST_N:  # it counts wherever the plate reads it while nobody is near
             unloaded = free & (np.abs(mean - level) < _LARGEST_N)
+    if rests is not None:
+        unloaded &= ~rests
     unloaded = long_runs(unloaded, max(2, round(_LEAST_S * rate_hz)))
     if unloaded.any() or flight is None or not (aloft := flight & heard).any():
         return unloaded
@@ -155,9 +161,34 @@ def nobody_near(recording: Recording, plate: Plate) -> np.ndarray:
     clear = feet_seen & ~(low & (distance < reach)).any(axis=1)
     width = 2 * round(_AFTER_STEP_S * recording.marker_rate_hz) + 1
     clear = np.convolve(~clear, np.ones(width), mode="same") <= 0
-    ratio = recording.marker_rate_hz / recording.analog_rate_hz
-    frames = np.rint(np.arange(len(plate.usable)) * ratio).astype(int)
+    frames = _frame_of_sample(recording, len(plate.usable))
     return clear[np.clip(frames, 0, len(clear) - 1)] & (frames < len(clear))
+
+
+def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
+    """Samples at which a foot whose markers are all on the ground has one on the plate, (n_analog,)
+    bool; of a plate without an outline, is where the plate is pressed."""
+    n, last = len(plate.usable), len(recording.markers_m) - 1
+    frames, rests = _frame_of_sample(recording, n), np.zeros(n, bool)
+    if not recording.labels or last < 0:
+        return rests
+    surface_m = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
+    known = recording.labels, recording.markers_m, np.minimum(frames, last), [surface_m]
+    feet = Feet.of(*known)
+    for side in set(feet.sides):
+        mine = feet.of_side(side)
+        if plate.corners_m is None:
+            on = mine.distance_m(plate.cop_m(), np.zeros(n, bool)) < BESIDE_M
+        else:
+            on = is_inside(mine.points_m[..., :2], plate.corners_m).any(axis=1)
+        rests |= np.asarray(on & np.isfinite(mine.points_m).all(axis=(1, 2)))
+    return rests & (frames <= last)
+
+
+def _frame_of_sample(recording: Recording, n: int) -> np.ndarray:
+    """Of n analog samples, the nearest marker frame."""
+    ratio = recording.marker_rate_hz / recording.analog_rate_hz
+    return np.rint(np.arange(n) * ratio).astype(int)
 
 
 # --- at the marker times --------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from bsip_cli.recordings.plate_wrench import (
     silent_frames,
     subtract_zero,
     unloaded_samples,
+    without_zeros,
 )
 from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
 from bsip_cli.recordings.plates_of_files import C3dPlate
@@ -290,6 +291,38 @@ def test_a_plate_that_is_never_unloaded_keeps_its_zero():
     assert not unloaded.any()
     same, finding = subtract_zero(plate, unloaded, RATE_HZ)
     assert same is plate and finding.level == "info"
+
+
+BESIDE = np.array([0.0, -0.61, 0.0])  # the next plate, on which nobody stands
+
+
+@pytest.mark.parametrize(
+    ("has_outline", "at", "lifted_m", "is_zero"),
+    [
+        (True, [0, 0, 0], 0.0, False),  # who sits, or stands on the other leg
+        (False, [0, 0, 0], 0.0, False),
+        (True, BESIDE, 0.0, True),
+        (False, [0.2, 0.5, 0], 0.0, True),  # so far from the feet is no pressure of theirs
+        (True, [0, 0, 0], 0.06, True),  # a foot that swings over a belt, heel up
+        (False, [0, 0, 0], 0.06, True),
+    ],
+)
+def test_a_light_load_under_a_foot_that_rests_is_no_zero(has_outline, at, lifted_m, is_zero):
+    """30 N for 3 s, with a hundredth more of noise."""
+    markers, labels = standing_markers(300)
+    markers[150:, [0, 2], 2] += lifted_m
+    place = np.array([0.2, 0.3, 0.0]) + at
+    force = np.column_stack([np.zeros((3000, 2)), np.full(3000, 30.0)])
+    force += np.random.default_rng(4).normal(0, 0.3, force.shape)
+    wrench = np.hstack([force, np.cross(place, force)])
+    corners = CORNERS_M + at if has_outline else None
+    plate = Plate("1", wrench, corners, np.ones(3000, bool))
+    recording = Recording(
+        None, 100.0, tuple(labels), markers, RATE_HZ, (plate,), (), np.eye(3), "", 0.0
+    )
+    less, (finding,), zeros = without_zeros(recording)
+    assert bool(zeros) == is_zero and (finding.level == "corrected") == is_zero
+    assert np.median(less.plates[0].lift_N) == pytest.approx(0.0 if is_zero else 30.0, abs=0.1)
 
 
 N_LIFT, ZERO = 400, slice(0, 50)

@@ -182,7 +182,7 @@ def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
             on = mine.distance_m(plate.cop_m(), np.zeros(n, bool)) < BESIDE_M
         else:
             on = is_inside(mine.points_m[..., :2], plate.corners_m).any(axis=1)
-        rests |= on & np.isfinite(mine.points_m).all(axis=(1, 2))
+        rests = rests | (on & np.isfinite(mine.points_m).all(axis=(1, 2)))
     return rests & (frames <= last)
 
 

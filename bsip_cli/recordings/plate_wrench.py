@@ -169,8 +169,7 @@ def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
     """Samples at which a foot whose markers are all on the ground has one on the plate, (n_analog,)
     bool; of a plate without an outline, is where the plate is pressed."""
     n, last = len(plate.usable), len(recording.markers_m) - 1
-    frames = _frame_of_sample(recording, n)
-    rests: np.ndarray = np.zeros(n, bool)
+    frames, rests = _frame_of_sample(recording, n), np.zeros(n, bool)
     if not recording.labels or last < 0:
         return rests
     surface_m = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
@@ -181,8 +180,8 @@ def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
         if plate.corners_m is None:
             on = mine.distance_m(plate.cop_m(), np.zeros(n, bool)) < BESIDE_M
         else:
-            on = is_inside(mine.points_m[..., :2], plate.corners_m).any(axis=1)
-        rests = rests | (on & np.isfinite(mine.points_m).all(axis=(1, 2)))
+            on = np.any(is_inside(mine.points_m[..., :2], plate.corners_m), axis=1)
+        rests |= on & np.all(np.isfinite(mine.points_m), axis=(1, 2))
     return rests & (frames <= last)
 
 

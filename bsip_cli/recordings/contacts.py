@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.ndimage import binary_propagation
+from scipy.stats import median_abs_deviation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs, runs, times
 from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, LOWEST_M, lowest, outline
+from bsip_cli.statistics.samples import Z95
 
 NO_MASS = (
     "whether something else bears the person (seat, box, hands) is not known: neither a stated "
@@ -107,11 +110,14 @@ def contact_windows(
     mass_kg: float | None,
     rate_hz: float,
     stands_kg: float | None = None,
+    body_reach_m_s2: np.ndarray | None = None,
 ) -> Contacts:
     """Frames in which the plates measure all that touches the person.
 
     ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
-    None, no frame can be shown to be free of other contacts, and none is valid. ``stands_kg`` is
+    None, no frame can be shown to be free of other contacts, and none is valid. ``body_reach_m_s2``
+    (n_frames,) : what the vertical force has to be over the mass, by all segments: it shows when
+    something begins to bear that bears a third of the weight later. ``stands_kg`` is
     what the plates read of the person standing still: where that is less, the forces or the mass
     are wrong alike in all frames, and nothing else bears the person.
     """
@@ -128,6 +134,9 @@ def contact_windows(
         allowed_N = _MISMATCH_SHARE * (weight_N + np.abs(needed_N - weight_N))
         different = np.abs(measured_N - needed_N) > allowed_N
         mismatch = long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
+        if body_reach_m_s2 is not None:
+            apart = measured_N / weight_N - body_reach_m_s2 / GRAVITY_M_S2
+            mismatch = _from_its_start(mismatch, apart, feet.valid, TOUCHED_N / weight_N)
         valid = long_runs(feet.valid & ~mismatch, shortest)
         # Something else may bear the person in all of these frames, though in none for sure: a foot
         # on a plate that is not there, while the body sinks. In 181 trials of real and simulated
@@ -151,6 +160,20 @@ def contact_windows(
         when = times(unexplained, rate_hz, feet.time0_s, *_SAID)
         reasons += (_finding("", f"{force}: {cause} {when}"),)
     return replace(feet, valid=valid, reasons=reasons)
+
+
+def _from_its_start(
+    mismatch: np.ndarray, apart: np.ndarray, valid: np.ndarray, least: float
+) -> np.ndarray:
+    """Where something else clearly bears the person (n,), and before and after it where it bears
+    less: the difference ``apart`` (n,) is beyond that of 19 of 20 of the other ``valid`` frames,
+    and beyond the ``least`` that is a touch."""
+    others = apart[valid & ~mismatch]
+    if not mismatch.any() or not len(others):
+        return mismatch
+    usual = max(least, Z95 * median_abs_deviation(others, scale="normal"))
+    more = np.abs(apart - np.median(others)) > usual
+    return np.asarray(binary_propagation(mismatch, mask=mismatch | more))
 
 
 @dataclass(frozen=True, eq=False)

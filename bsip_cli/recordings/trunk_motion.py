@@ -43,8 +43,11 @@ def reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None
     """Gravity and the vertical acceleration of the markers' mean (n_frames, k, 3), low-passed,
     (n_frames,)."""
     height = mean_path(trunk_markers_m[..., 2])
-    if height is None:
-        return None
+    return None if height is None else path_reach_m_s2(height, rate_hz)
+
+
+def path_reach_m_s2(height: np.ndarray, rate_hz: float) -> np.ndarray:
+    """The same of a path's heights (n_frames,)."""
     velocity = np.gradient(low_pass(height, rate_hz)) * rate_hz
     return GRAVITY_M_S2 + np.gradient(velocity) * rate_hz
 

@@ -145,7 +145,9 @@ def _contacts(
     if mass is None:
         loaded = feet.valid & momentum_mass.upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
-    return contact_windows(feet, trunk, mass, rate_hz, stands_kg), intervals, about_mass
+    reach = momentum_mass.body_reach_m_s2(markers, rate_hz)
+    contacts = contact_windows(feet, trunk, mass, rate_hz, stands_kg, reach)
+    return contacts, intervals, about_mass
 
 
 def _mass_on_plates(

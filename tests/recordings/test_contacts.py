@@ -57,10 +57,12 @@ def _read_as(wrench: np.ndarray, corners: np.ndarray | None) -> Plate:
     return Plate("1", wrench, corners, np.isfinite(wrench).all(axis=1))
 
 
-def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None, time0_s=0.0):
+def _windows(
+    left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None, time0_s=0.0, body=None
+):
     feet = foot_contacts({"l": left, "r": right}, RATE_HZ, plates, N, time0_s)
     trunk = _trunk() if trunk is None else trunk
-    return contact_windows(feet, trunk, mass_kg, RATE_HZ, stands_kg)
+    return contact_windows(feet, trunk, mass_kg, RATE_HZ, stands_kg, body)
 
 
 def test_standing_on_the_plate_is_valid():
@@ -125,6 +127,20 @@ def test_a_foot_across_two_plates_is_measured():
     across[..., 1] = [0.45, 0.6]
     assert _windows(across, _foot(0.4), [_plate(WEIGHT_N), second]).valid.all()
     assert not _windows(across, _foot(0.4), [_plate(WEIGHT_N)]).valid.any()
+
+
+def test_a_chair_bears_from_the_first_touch_on():
+    """It bears a third of the weight, which is clear, long after it is touched. A swing of the arms
+    that the trunk does not show is no touch."""
+    rng = np.random.default_rng(3)
+    weight = np.interp(np.arange(N), [120, 180, 220, 280], [1.0, 0.2, 0.2, 1.0])
+    arms = 0.1 * np.sin(2 * np.pi * 1.5 * np.arange(N) / RATE_HZ) * (np.arange(N) < 90)
+    force = WEIGHT_N * (weight + arms + 0.01 * rng.standard_normal(N))
+    body = GRAVITY * (1 + arms)
+    result = _windows(_foot(0.1), _foot(0.4), [_plate(force)], body=body)
+    assert result.valid[:115].all() and not result.valid[130:270].any() and result.valid[285:].all()
+    by_trunk = _windows(_foot(0.1), _foot(0.4), [_plate(force)])
+    assert by_trunk.valid[:140].all()
 
 
 def test_a_chair_is_named():

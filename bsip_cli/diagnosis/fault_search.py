@@ -10,7 +10,7 @@ along a little with every candidate.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +21,15 @@ from bsip_cli.diagnosis.fault_scores import Kind, Library, Scores, scores_of, sm
 from bsip_cli.diagnosis.held_out import unevenness
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.nameless import UNEXPLAINED, Course, Mean
+from bsip_cli.statistics.samples import Z95
 
 _TRIED = 8  # candidates of a round that are fitted in full
 _OF_A_KIND = 2  # of them, of the same effect
 _POLISHED = 3  # of those that have moments, frequencies or windows
 _STARTS = 2  # values of a scan from which a finer search begins
 _MOST = 8  # faults of a person
+Where = tuple[str, str, tuple[int, ...]]
+"""A fault's name and target, and its trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,31 +82,50 @@ class Found:
 def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()) -> Found:
     """named_from : probability from which on one name is said; else so many as hold it. known :
     faults that are there for other reasons; they come first in the fit and have no verdict."""
-    fit = fitted(library.session, known)
-    for _ in range(_MOST):
-        tried = one_round(library, fit)
+    fit, refuted = fitted(library.session, known), frozenset[Where]()
+    while len(fit.faults) < len(known) + _MOST:
+        tried = one_round(library, fit, refuted)
         if not tried or tried[0].log_odds < 0:
             break
+        before = fit
         fit = corrected(fitted(library.session, tried[0].fit.faults, start=tried[0].fit))
         if _can_be_uneven(fit.faults[-1]):  # is it likelier of another size in every second?
             inflation = scores_of(library, fit).inflation
             log = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
-            fit = fit if log < 0 else _unnamed(fit)
-    fit, verdicts = _judged(library, fit, named_from, len(known))
+            if log >= 0 and _moves_others(before, fit, inflation):
+                refuted, fit = refuted | {_place_of(fit.faults[-1])}, before
+            elif log >= 0:
+                fit = _unnamed(fit)
+    fit, verdicts = _judged(library, fit, named_from, len(known), refuted)
     hardly = [(one.fault, float(expit(one.log_odds))) for one in tried]
     said = set()
     for verdict in verdicts:
         members = [(x.fault, p) for x, p in verdict.members]
         if verdict.probability >= named_from:
-            said |= {(*one.key, one.trials) for one, _ in members}
+            said |= {_place_of(one) for one, _ in members}
         else:
             hardly += members
         hardly += verdict.others
-    best: dict[tuple[object, ...], tuple[Hypothesis, float]] = {}
+    best: dict[Where, tuple[Hypothesis, float]] = {}
     for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
-        if (place := (*one.key, one.trials)) not in said:
+        if (place := _place_of(one)) not in said:
             best.setdefault(place, (one, probability))
     return Found(fit, verdicts, tuple(best.values()), scores_of(library, fit))
+
+
+def _place_of(one: Hypothesis) -> Where:
+    return (*one.key, one.trials)
+
+
+def _moves_others(before: Fitted, fit: Fitted, inflation: np.ndarray) -> bool:
+    """Whether the last fault takes another that was there ``before`` out of its 95 % interval: what
+    is uneven, and beside which another is of another size, is neither."""
+    for number, one in enumerate(before.faults):
+        spread = np.sqrt(np.diag(before.covariance_of(number)) * inflation[list(one.trials)].mean())
+        moved = (fit.faults[number].values - one.values) / one.typical
+        if (np.abs(moved) > Z95 * spread)[one.is_free].any():
+            return True
+    return False
 
 
 def _can_be_uneven(one: Hypothesis) -> bool:
@@ -118,13 +140,13 @@ def _unnamed(fit: Fitted) -> Fitted:
 
 
 def _judged(
-    library: Library, fit: Fitted, named_from: float, known: int
+    library: Library, fit: Fitted, named_from: float, known: int, refuted: Collection[Where]
 ) -> tuple[Fitted, tuple[Verdict, ...]]:
     """Each fault given the others; one that is likelier absent goes, the least likely first."""
     while True:
         inflation = scores_of(library, fit).inflation
         numbers = range(known, len(fit.faults))
-        found = [_verdict(library, fit, k, named_from, inflation) for k in numbers]
+        found = [_verdict(library, fit, k, named_from, inflation, refuted) for k in numbers]
         weakest = min(found, key=lambda one: one[0].probability, default=None)
         if weakest is None or weakest[0].probability > 0.5:
             return fit, tuple(verdict for verdict, _ in found)
@@ -132,7 +154,12 @@ def _judged(
 
 
 def _verdict(
-    library: Library, fit: Fitted, number: int, named_from: float, inflation: np.ndarray
+    library: Library,
+    fit: Fitted,
+    number: int,
+    named_from: float,
+    inflation: np.ndarray,
+    refuted: Collection[Where],
 ) -> tuple[Verdict, Fitted]:
     """Of the probability that a fault or another in its place is there, the shares of each; and the
     fit without it."""
@@ -142,7 +169,7 @@ def _verdict(
     again = fitted(fit.session, (*others, one), start=without, whole=False)
     prior = library.log_prior_of(Kind(one.effect, one.target, one.trials))
     mine = {one.key: Tried(again, prior)}
-    for other in _in_full(library, without, set(one.trials)):
+    for other in _in_full(library, without, refuted, set(one.trials)):
         mine.setdefault(other.fault.key, other)
     mine |= {other.fault.key: other for other in _means_of_nameless(without, one)}
     mine = {key: x.weighed(without, inflation) for key, x in mine.items()}
@@ -189,10 +216,10 @@ def _means_of_nameless(without: Fitted, one: Hypothesis) -> Iterator[Tried]:
             yield Tried(fit, prior)
 
 
-def one_round(library: Library, fit: Fitted) -> list[Tried]:
-    """The likeliest candidates in full given a fit's faults, the likeliest first; how much of them
-    is chance is seen next to the best one."""
-    tried = _in_full(library, fit)
+def one_round(library: Library, fit: Fitted, refuted: Collection[Where] = ()) -> list[Tried]:
+    """The likeliest candidates in full given a fit's faults, the likeliest first, but for those
+    ``refuted``; how much of them is chance is seen next to the best one."""
+    tried = _in_full(library, fit, refuted)
     if not tried:
         return []
     best = max(tried, key=lambda one: one.fit.log_evidence)
@@ -200,13 +227,15 @@ def one_round(library: Library, fit: Fitted) -> list[Tried]:
     return sorted((one.weighed(fit, inflation) for one in tried), key=lambda one: -one.log_odds)
 
 
-def _in_full(library: Library, fit: Fitted, trials: set[int] | None = None) -> list[Tried]:
+def _in_full(
+    library: Library, fit: Fitted, refuted: Collection[Where], trials: set[int] | None = None
+) -> list[Tried]:
     """The likeliest candidates, those that touch some of ``trials``, fitted."""
     scores = scores_of(library, fit)
     inflation = [scores.inflation_in(place.trials) for place in library.places]
     log = scores.log_factor / inflation + library.log_prior
     tried: list[tuple[Tried, Iterator[Hypothesis]]] = []
-    for kind in _chosen(library, fit, log, trials):
+    for kind in _chosen(library, fit, log, refuted, trials):
         starts = _starts(library, scores, kind, log)
         fits = (_with_one_more(fit, fit, one) for one in starts)
         if (now := next((one for one in fits if one is not None), None)) is not None:
@@ -230,7 +259,11 @@ def _polished(fit: Fitted, one: Tried, starts: Iterable[Hypothesis]) -> Tried:
 
 
 def _chosen(
-    library: Library, fit: Fitted, log: np.ndarray, asked: set[int] | None
+    library: Library,
+    fit: Fitted,
+    log: np.ndarray,
+    refuted: Collection[Where],
+    asked: set[int] | None,
 ) -> Iterator[Kind]:
     """The likeliest kinds of places; no effect takes all of them.
 
@@ -244,6 +277,7 @@ def _chosen(
     for kind, mine in library.kinds.items():
         effect, target, trials = kind
         new = all((effect.name, target, t) not in known for t in trials)
+        new &= (effect.name, target, trials) not in refuted
         if new and closed.isdisjoint(trials) and (asked is None or asked & set(trials)):
             kinds[kind] = np.logaddexp.reduce(log[mine])
     taken: Counter[tuple[Effect, bool]] = Counter()

@@ -175,6 +175,31 @@ def test_plates_that_are_moved_in_the_middle_of_two_trials_are_uneven(seed):
     assert moved_from(4.9) > 5
 
 
+def test_what_is_uneven_and_moves_another_fault_is_neither(monkeypatch):
+    """A drift takes a delay out of its interval, a plate's zero does not; both are said to be of
+    another size in every second."""
+
+    def unevenness_of(fit, number, inflation):
+        return -10.0 if fit.faults[number].effect.name == "sync_offset" else 10.0
+
+    monkeypatch.setattr(fault_search, "unevenness", unevenness_of)
+    scene = movement(1)
+    zero = with_effect(late(scene, 0.03), EFFECTS["plate_zero"], "1 fx", 6.0)
+    asked = [EFFECTS[name] for name in ("sync_offset", "clock_drift", "plate_zero")]
+    one, other = told(found_in(zero, asked=asked))
+    assert {one.effect, other.effect} == {"sync_offset", UNEXPLAINED}
+    drifting = replace(
+        scene,
+        plates=tuple(
+            replace(a, wrench=a.wrench + (b.wrench - a.wrench) * scene.times_s[:, None] / 8.0)
+            for a, b in zip(late(scene, 0.01).plates, late(scene, 0.03).plates, strict=True)
+        ),
+    )
+    (delay,) = told(found_in(drifting, asked=asked))
+    assert (delay.effect, delay.verdict) == ("sync_offset", "named")
+    assert 0.017 < delay.numbers[0].value < 0.023
+
+
 def pulled(scene: Scene, mean_N: float, varying_N: float) -> Scene:
     """By a force on the pelvis along x that hangs on its height."""
     height = scene.q[:, 2] - scene.q[scene.valid, 2].mean()

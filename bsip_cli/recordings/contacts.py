@@ -17,7 +17,6 @@ from bsip_cli.recordings.analog import long_runs, runs, times
 from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.trunk_motion import low_pass, reach_m_s2
 from bsip_cli.recordings.under_the_feet import BESIDE_M, LOWEST_M, lowest, outline
-from bsip_cli.statistics.samples import Z95
 
 NO_MASS = (
     "whether something else bears the person (seat, box, hands) is not known: neither a stated "
@@ -35,6 +34,7 @@ TOUCHED_N = 20.0
 _COP_DISTANCE_M = 0.35
 _MISMATCH_SHARE = 0.35  # of body weight, and of the force's own departure from it
 _MISMATCH_S = 0.1
+_IN_19_OF_20 = 1.96  # standard deviations
 _BLINK_S = 0.06  # shorter touches without load are no touch
 _LEAST_WINDOW_S = 0.1
 _SAID = 2, 6  # of times: digits, and so many at most
@@ -171,7 +171,7 @@ def _from_its_start(
     others = apart[valid & ~mismatch]
     if not mismatch.any() or not len(others):
         return mismatch
-    usual = max(least, Z95 * median_abs_deviation(others, scale="normal"))
+    usual = max(least, _IN_19_OF_20 * median_abs_deviation(others, scale="normal"))
     more = np.abs(apart - np.median(others)) > usual
     return np.asarray(binary_propagation(mismatch, mask=mismatch | more))
 

@@ -13,7 +13,7 @@ from bsip_cli.recordings.analog import long_runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.trunk_motion import in_flight
-from bsip_cli.recordings.under_the_feet import BESIDE_M, Feet, is_inside
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Feet
 
 _NOTICED_N = 1.0
 _WINDOW_S = 0.2
@@ -166,23 +166,20 @@ def nobody_near(recording: Recording, plate: Plate) -> np.ndarray:
 
 
 def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
-    """Samples at which a foot whose markers are all on the ground has one on the plate, (n_analog,)
-    bool; of a plate without an outline, is where the plate is pressed."""
+    """Samples at which the plate is pressed where a foot stands whose markers are all on the
+    ground, (n_analog,) bool: an offset would have its centre of pressure anywhere."""
     n, last = len(plate.usable), len(recording.markers_m) - 1
     frames, rests = _frame_of_sample(recording, n), np.zeros(n, bool)
     if not recording.labels or last < 0:
         return rests
     surface_m = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
     known = recording.labels, recording.markers_m, np.minimum(frames, last), [surface_m]
-    feet = Feet.of(*known)
+    feet, cop_m = Feet.of(*known), plate.cop_m()
     for side in set(feet.sides):
         mine = feet.of_side(side)
-        if plate.corners_m is None:
-            on = mine.distance_m(plate.cop_m(), np.zeros(n, bool)) < BESIDE_M
-        else:
-            on = np.any(is_inside(mine.points_m[..., :2], plate.corners_m), axis=1)
+        on = mine.distance_m(cop_m, np.zeros(n, bool)) < BESIDE_M
         rests |= on & np.all(np.isfinite(mine.points_m), axis=(1, 2))
-    return rests & (frames <= last)
+    return rests & (frames <= last) & (plate.lift_N > _QUIET_N)  # by less nothing is pressed
 
 
 def _frame_of_sample(recording: Recording, n: int) -> np.ndarray:

@@ -100,7 +100,8 @@ class Feet:
         """Those on a plate of these corners (4, 3), where any are, else all."""
         if corners_m is None:
             return self
-        inside = is_inside(self.points_m[..., :2], corners_m, _RIM_M)
+        beyond = _beyond(self.points_m[..., :2], corners_m)
+        inside = (beyond <= _RIM_M).all(axis=-1)
         some = np.any(inside, axis=1, keepdims=True)
         points = np.where((inside | ~some)[..., None], self.points_m, np.nan)
         return replace(self, points_m=points)
@@ -110,7 +111,7 @@ class Feet:
         corners (4, 3)."""
         on = np.isnan(self.points_m[..., 0])
         for corners_m in outlines:
-            on = on | is_inside(self.points_m[..., :2], corners_m, _RIM_M)
+            on = on | (_beyond(self.points_m[..., :2], corners_m) <= _RIM_M).all(axis=-1)
         return self.both_seen and bool(outlines) and bool(on.all())
 
     @property
@@ -265,12 +266,6 @@ def mean_evidence(found: np.ndarray) -> Evidence:
 def is_on_surface(above_m: float) -> bool:
     """Whether the lowest marker of a foot on the ground may be so far above the surface."""
     return LOWEST_M[0] < above_m < LOWEST_M[1]
-
-
-def is_inside(places_m: np.ndarray, corners_m: np.ndarray, rim_m: float = 0.0) -> np.ndarray:
-    """Whether places (..., 2) are on a plate of these corners (4, 3), or no further beside it than
-    a rim, (...) bool."""
-    return np.asarray((_beyond(places_m, corners_m) <= rim_m).all(axis=-1))
 
 
 def falling(size: float | np.ndarray, scale: float | np.ndarray) -> np.ndarray:

@@ -104,6 +104,12 @@ class Session:
         return sum(len(part.coefficients) for part in self.parts)
 
     @cached_property
+    def grams(self) -> tuple[np.ndarray, ...]:
+        """Per trial (6, K', K') products of the columns with each other, by component."""
+        by_component = (np.moveaxis(one, 1, 0) for one in self.columns)
+        return tuple(np.array([x.T @ x for x in one]) for one in by_component)
+
+    @cached_property
     def scales(self) -> dict[str, np.ndarray]:
         """The coefficients (k,) that have a scale in common."""
         found: dict[str, list[np.ndarray]] = {}
@@ -203,7 +209,8 @@ def error_model(trials: Sequence[TrialErrors], parts: int, adapt: bool = True) -
         )
         solution, scales = _solution(folds, session, adapt)
         by_trial = enumerate(zip(residual, session.columns, strict=True))
-        left, signals = zip(*(left_by(*one, solution, t) for t, one in by_trial), strict=True)
+        found = (left_by(session, t, *one, solution) for t, one in by_trial)
+        left, signals = zip(*found, strict=True)
     return ErrorModel(session, solution, scales, left, folds, adapt)
 
 
@@ -221,11 +228,17 @@ def _folds(
 
 
 def left_by(
-    residual: np.ndarray, columns: np.ndarray, solution: Solution, trial: int
+    session: Session, trial: int, residual: np.ndarray, columns: np.ndarray, solution: Solution
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) what the terms leave, and a signal as large as it may be, they being uncertain."""
+    """(n, 6) what the terms leave of a trial, and a signal as large as it may be, they being
+    uncertain; columns (n, 6, K') are the session's, and those of faults behind them."""
     left = residual - columns @ solution.mean[solution.trials[trial].used]
-    doubt = sum(((columns @ x.T) ** 2).sum(axis=(0, 2)) for x in solution.roots(trial))
+    covariance, grams = solution.covariance_in(trial), session.grams[trial]
+    known = grams.shape[1]
+    doubt = (grams * covariance[:known, :known]).sum(axis=(1, 2))
+    if (faults := columns[..., known:]).shape[2]:  # twice with the session's, once with each other
+        moved = columns @ covariance[:, known:] + columns[..., :known] @ covariance[:known, known:]
+        doubt += (moved * faults).sum(axis=(0, 2))
     return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
 
 

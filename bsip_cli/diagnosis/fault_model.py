@@ -287,7 +287,7 @@ def fitted(
         before = found
         for t in trials:
             if whole or changed[t]:  # with the noise that the fit leaves
-                pieces[t] = like(t, left_by(*laid[t][:2], found.solution, t)[1])
+                pieces[t] = like(t, left_by(session, t, *laid[t][:2], found.solution)[1])
         found = solved_for(pieces, found.root)
         if abs(found.log_evidence - before.log_evidence) < _CONVERGED:
             break

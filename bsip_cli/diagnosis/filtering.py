@@ -18,6 +18,7 @@ _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _FLOOR = 1e-6  # of the noise's power, taken for white
+_IN_CACHE = 2**17  # bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +79,14 @@ class Noise:
         a span's first samples stay as they are."""
         columns = columns / self.size[:, None]
         out = columns.copy()
+        rows = max(1, _IN_CACHE // max(columns[0].nbytes, 1))
         for start, stop in self.filter.spans:
-            for lag in range(1, min(_ORDER, stop - start - 1) + 1):
-                earlier = columns[start : stop - lag]
-                out[start + lag : stop] -= self.recursion[:, lag - 1, None] * earlier
+            for first in range(start, stop, rows):  # as many as stay near the processor
+                last = min(first + rows, stop)
+                for lag in range(1, min(_ORDER, last - start - 1) + 1):
+                    begin = max(first, start + lag)
+                    earlier = columns[begin - lag : last - lag]
+                    out[begin:last] -= self.recursion[:, lag - 1, None] * earlier
         return out.reshape(-1, columns.shape[2])
 
     def white_one(self, wrench: np.ndarray) -> np.ndarray:

@@ -96,6 +96,10 @@ class Solution:
             found[one.used[one.own]] = one.inverse.T @ (pull - one.across @ left[one.others])
         return self.root[:, None] * found
 
+    def covariance_in(self, trial: int) -> np.ndarray:
+        """(K', K') of what a trial uses."""
+        return sum(x.T @ x for x in self.roots(trial))
+
     def roots(self, trial: int) -> tuple[np.ndarray, np.ndarray]:
         """(o, K') and (S, K') of the covariance of what a trial uses: A'A + B'B, of what it uses
         with what another one does B'B alone."""

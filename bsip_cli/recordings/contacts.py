@@ -85,6 +85,9 @@ def foot_contacts(
     total = np.sum([plate.lift_N for plate in plates], axis=0)
     on_ground, on_plate, reasons, valid = {}, {}, [], usable.copy()
     clock = rate_hz, time0_s, *_SAID
+    where = "on the floor beside the plates"
+    if any(plate.corners_m is None for plate in plates):
+        where += ", or on one that bears nothing"
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz)
@@ -92,7 +95,7 @@ def foot_contacts(
         valid &= ~off & foot.seen
         beside = beside | off
         said = (
-            (off & usable, "on the floor beside the plates"),
+            (off & usable, where),
             (~foot.seen, "no foot marker seen"),
         )
         for mask, words in said:

@@ -476,10 +476,8 @@ def _fault(found: Evidence) -> str:
     if not np.isfinite(found.distance_m) and found.outside_m > BESIDE_M:
         return f"its centre of pressure lies {found.outside_m:.2f} m outside the plate"
     if found.rolls_m < STAYS_M:
-        spread = (
-            f"its centre of pressure spreads by {1e3 * found.rolls_m:.1f} mm only while the body"
-        )
-        return f"{spread} passes over it, as if its moments were too small"
+        spread = f"its centre of pressure spreads by {1e3 * found.rolls_m:.1f} mm only"
+        return f"{spread} while the body passes over it, as if its moments were too small"
     if np.isfinite(found.above_m) and not is_on_surface(found.above_m):
         way = "below" if found.above_m > 0 else "above"
         return f"its surface lies {abs(found.above_m):.2f} m {way} the foot's lowest marker on it"

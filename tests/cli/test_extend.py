@@ -34,8 +34,7 @@ EXTEND = [stage.label for stage in STAGES if stage.name == "extend"]
 def run_of(options: StudyOptions, folder: Path, bsip) -> Run:
     run = Run.within(folder)
     simulate_study(run.study, options)
-    answer = bsip("run", run.study, "--out", run.out)
-    assert answer.code == 0, answer.err
+    bsip.done("run", run.study, "--out", run.out)
     return run
 
 
@@ -142,7 +141,7 @@ def test_reconstruct_stays_fresh_and_is_noticed(run, bsip):
     assert run.perform("reconstruct (trial)", SQUAT).state == "fresh"
     header = run.provenance("fit", SQUAT)
     assert (header["made_by"]["stage"], header["amended_by"]["stage"]) == ("reconstruct", "extend")
-    assert bsip("reconstruct", run.study, "--out", run.out, "--force").code == 0
+    bsip.done("reconstruct", run.study, "--out", run.out, "--force")
     assert extended(run.read("fit", SQUAT)) == []
     answer = bsip("extend", run.study, "--out", run.out)
     assert answer.summary.startswith("bsip extend: 3 done, 2 up to date;")

@@ -103,8 +103,7 @@ def first_run(tmp_path_factory, bsip):
     folder = tmp_path_factory.mktemp("small")
     simulate_study(folder / "study", OPTIONS)
     run = WholeRun.within(folder)
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0, answer.err
+    answer = bsip.done("run", run.study, "--out", run.out, "--jobs", 2)
     assert answer.summary == f"bsip run: {UNITS} done; results in {run.out}"
     return run
 
@@ -151,7 +150,7 @@ def test_files_of_a_run(first_run):
 def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):
     """Another folder, one process instead of two."""
     again = WholeRun(first_run.study, tmp_path / "elsewhere")
-    assert bsip("run", again.study, "--out", again.out, "--jobs", 1).code == 0
+    bsip.done("run", again.study, "--out", again.out, "--jobs", 1)
     assert again.changed(first_run.content()) == []
 
 
@@ -211,13 +210,11 @@ def sha256(path: Path) -> str:
 
 
 def test_show_prints_the_tables(first_run, bsip):
-    brief = bsip("show", first_run.out)
-    assert brief.code == 0
+    brief = bsip.done("show", first_run.out)
     assert len(brief.out.splitlines()) <= 24
     assert [f"sub-0{k}: " in brief.out for k in (1, 2)] == [True, True]
     assert "| " not in brief.out
-    answer = bsip("show", first_run.out, "--full")
-    assert answer.code == 0
+    answer = bsip.done("show", first_run.out, "--full")
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
@@ -225,8 +222,7 @@ def test_show_prints_the_tables(first_run, bsip):
 
 
 def test_methods_say_what_was_done(first_run, bsip, tmp_path):
-    answer = bsip("methods", first_run.out)
-    assert answer.code == 0
+    answer = bsip.done("methods", first_run.out)
     text = " ".join(answer.out.split())
     assert "Recordings of 2 persons (1 female and 1 male;" in text
     assert f"bsip {__version__}" in text
@@ -240,7 +236,7 @@ def test_methods_say_what_was_done(first_run, bsip, tmp_path):
 def test_methods_name_options_that_differ(run, bsip, tmp_path):
     other = options_in(tmp_path, "[reconstruct]\ncutoff_hz = 7.0\n")
     asked = ("--participant", "sub-01", "--config", other)
-    assert bsip("reconstruct", run.study, "--out", run.out, *asked).code == 0
+    bsip.done("reconstruct", run.study, "--out", run.out, *asked)
     text = " ".join(bsip("methods", run.out).out.split())
     assert "Options that differ among the results (the text gives the first): reconstruct." in text
     assert "below 7.0 Hz" in text
@@ -282,8 +278,9 @@ def test_the_library_gives_the_same_tables(first_run):
 @pytest.mark.parametrize("what", ["joints", "opensim", "bids"])
 def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
     to = tmp_path / "to"
-    answer = bsip("export", first_run.study, "--out", first_run.out, "--what", what, "--to", to)
-    assert answer.code == 0, answer.err
+    answer = bsip.done(
+        "export", first_run.study, "--out", first_run.out, "--what", what, "--to", to
+    )
     names = {path.relative_to(to).as_posix() for path in to.rglob("*") if path.is_file()}
     if what == "bids":
         assert {"dataset_description.json", "participants.tsv"} < names
@@ -312,8 +309,7 @@ def _models(run: Run) -> list[str]:
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):
     path = first_run.path("bsip")
-    answer = bsip("info", path)
-    assert answer.code == 0
+    answer = bsip.done("info", path)
     lines = answer.out.splitlines()
     assert lines[0] == path.name
     assert lines[1].startswith("kind      bsip, version 1: ")
@@ -328,8 +324,7 @@ def test_info_tells_what_made_an_artifact(first_run, bsip):
 
 def test_second_run_does_nothing(run, bsip):
     content, times = run.content(), run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0
+    answer = bsip.done("run", run.study, "--out", run.out, "--jobs", 2)
     assert answer.err.splitlines() == [f"bsip run: {UNITS} up to date; results in {run.out}"]
     assert answer.out == ""
     assert run.times() == times
@@ -350,8 +345,7 @@ def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
     with run.recording("sub-01_task-squat_run-1").open("ab") as handle:
         handle.write(bytes(512))
     times = run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0
+    bsip.done("run", run.study, "--out", run.out, "--jobs", 2)
     rewritten = run.rewritten(times)
     trials = {f"sub-01_{trial}" for trial in TRIALS}  # all read what the session was made of
     assert owners_of(rewritten, "ingest") == {"sub-01", *trials}
@@ -499,7 +493,7 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
     assert set(run.read("values", "group")["participant"]) == {"sub-01"}
     assert all(name.startswith("group/") for name in run.rewritten(times))
     before.to_csv(table, sep="\t", index=False, na_rep="n/a")
-    assert bsip("run", run.study, "--out", run.out, "--group").code == 0
+    bsip.done("run", run.study, "--out", run.out, "--group")
     assert run.content() == content
 
 
@@ -519,8 +513,7 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
 
 def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_path):
     own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
-    answer = bsip("tables", run.study, "--out", run.out, "--config", own)
-    assert answer.code == 0
+    answer = bsip.done("tables", run.study, "--out", run.out, "--config", own)
     assert answer.err.splitlines()[0] == (
         "tables: group: what `bsip stats` made of group is not up to date "
         "(other options (stats)); `bsip run` brings it up to date"
@@ -555,7 +548,7 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     assert "sub-01_task-squat_run-1" not in set(run.read("values", "group")["trial"])
 
     recording.write_bytes(whole)
-    assert bsip("run", run.study, "--out", run.out, "--jobs", 2).code == 0
+    bsip.done("run", run.study, "--out", run.out, "--jobs", 2)
     assert run.changed(first_run.content()) == []
 
 
@@ -565,7 +558,7 @@ def test_refused_recording_that_is_taken_out(run, bsip):
     assert bsip("ingest", run.study, "--out", run.out).code == 3
     assert run.path("refusal-ingest", recording.stem).exists()
     recording.unlink()
-    assert bsip("ingest", run.study, "--out", run.out).code == 0
+    bsip.done("ingest", run.study, "--out", run.out)
     assert not run.path("refusal-ingest", recording.stem).exists()
 
 
@@ -648,8 +641,7 @@ def test_warnings_are_told_and_kept(run, bsip):
     """A mass that the plates contradict: said on the terminal and in the artifact."""
     table = run.study / "participants.tsv"
     table.write_text(table.read_text().replace("\tM\t", "\tM\t1", 1))
-    answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
-    assert answer.code == 0
+    answer = bsip.done("scale", run.study, "--out", run.out, "--participant", "sub-01")
     (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
     assert "the plates measure" in told
     assert told.removeprefix("scale: ") in run.provenance("person")["messages"]
@@ -749,4 +741,4 @@ def test_a_second_run_on_the_same_folder_is_refused(run, bsip):
     assert answer.code == 2
     assert "sub-01: another bsip is writing there. To correct it: wait until" in answer.err
     assert not [name for name in run.changed(before) if "sub-01" in name]
-    assert bsip("run", run.study, "--out", run.out).code == 0
+    bsip.done("run", run.study, "--out", run.out)

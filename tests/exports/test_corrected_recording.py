@@ -511,5 +511,5 @@ def test_a_recording_that_changed_since_is_refused(hide, capsys):
 def test_options_that_do_not_fit_are_one_sentence(tmp_path, plain, options, words):
     results = Results(plain, tmp_path / "out")
     done = results.call(*(one.format(study=plain) for one in options))
-    assert done.returncode == 2
-    assert words in done.stderr and len(done.stderr.strip().splitlines()) == 1
+    assert done.code == 2
+    assert words in done.err and len(done.err.strip().splitlines()) == 1

@@ -9,7 +9,7 @@ import pytest
 
 from tests.program import Program
 
-PARTICIPANTS = "participant_id\tsex\tmass_kg\theight_m\nsub-01\tM\t70\t1.80\nsub-02\tF\t60\tn/a\n"
+COLUMNS = "participant_id\tsex\tmass_kg\theight_m"
 
 
 @pytest.fixture(scope="session")
@@ -34,6 +34,11 @@ def failing(monkeypatch) -> Callable[[str, Callable[[Path], bool], OSError], Non
     return make
 
 
+def write_table(root: Path, *lines: str) -> None:
+    """participants.tsv, with a line for each."""
+    (root / "participants.tsv").write_text("\n".join([COLUMNS, *lines, ""]))
+
+
 def make_people(root: Path, count: int) -> None:
     """Folders of participants, in each a recording that holds nothing."""
     for name in (f"sub-{k:02d}" for k in range(1, count + 1)):
@@ -46,5 +51,5 @@ def empty_study(tmp_path) -> Path:
     """Two participants whose recordings hold nothing."""
     root = tmp_path / "study"
     make_people(root, 2)
-    (root / "participants.tsv").write_text(PARTICIPANTS)
+    write_table(root, "sub-01\tM\t70\t1.80", "sub-02\tF\t60\tn/a")
     return root

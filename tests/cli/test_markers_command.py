@@ -13,6 +13,7 @@ from bsip_cli.artifacts import read_header
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.commands.markers import markers_command
 from bsip_cli.errors import BadDataError, UsageError
+from tests.cli.conftest import write_table
 from tests.recordings.recording_writers import standing_markers, write_trc
 
 LINE_M = 1.5
@@ -162,8 +163,7 @@ def study_with(folder: Path, *people: str) -> Path:
     study = folder / "study"
     for line in people:
         (study / line.split("\t")[0]).mkdir(parents=True)
-    lines = ["participant_id\tsex\tmass_kg\theight_m", *people]
-    (study / "participants.tsv").write_text("\n".join(lines) + "\n")
+    write_table(study, *people)
     return study
 
 

@@ -11,15 +11,10 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.participants import named_in
 from bsip_cli.study.study import load_study
-from tests.cli.conftest import make_people
+from tests.cli.conftest import COLUMNS, make_people, write_table
 
 ROLES = {"static": ("static",), "sequence": ("sequence", "dance")}
-COLUMNS = "participant_id\tsex\tmass_kg\theight_m"
 HEADER = f"{COLUMNS}\n"
-
-
-def write_table(root: Path, *lines: str) -> None:
-    (root / "participants.tsv").write_text(HEADER + "\n".join(lines) + "\n")
 
 
 def load(root: Path):

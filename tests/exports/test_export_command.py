@@ -22,6 +22,7 @@ from bsip_cli.running.unit import file_hash
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table
 from bsip_cli.stages.scale import _marker_table, _skeleton_table
+from tests.cli.conftest import make_people, write_table
 from tests.exports.exported_person import identified_person
 from tests.exports.test_osim_given import draw, inertias_in
 from tests.program import Answer, Program
@@ -79,17 +80,14 @@ def impossible(values: np.ndarray, segment: int) -> np.ndarray:
 
 @pytest.fixture
 def results(tmp_path) -> Results:
-    made = Results(tmp_path / "study", tmp_path / "out")
-    lines = ["participant_id\tsex\tmass_kg\theight_m"]
-    for name in ("sub-01", "sub-02"):
-        (made.study / name).mkdir(parents=True)
-        (made.study / name / f"{name}_task-static.c3d").write_bytes(b"")
-        lines.append(f"{name}\tM\t71.3\t1.77")
+    made, people = Results(tmp_path / "study", tmp_path / "out"), ("sub-01", "sub-02")
+    make_people(made.study, len(people))
+    write_table(made.study, *(f"{name}\tM\t71.3\t1.77" for name in people))
+    for name in people:
         write_person(made, name)
         values = readable(identified_person())
         made.write_inertias({"RM": values, "OM": values * 1.0}, name)
         write_choice(made, name)
-    (made.study / "participants.tsv").write_text("\n".join(lines) + "\n")
     return made
 
 

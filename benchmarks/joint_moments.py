@@ -138,7 +138,7 @@ def _true_moments(person: Person, trial: Trial, kind: str, side: str) -> np.ndar
         moved = poses.point(body, inertia.com_m), inertia.mass_kg, inertia.tensor_kgm2
         wrench += driving_wrench(R, *moved, GRAVITY, STEP_S)
     if "foot" in LIMBS[kind]:
-        wrench -= np.hstack(trial.feet_wrenches(apart=True)[side])
+        wrench -= np.hstack(trial.feet_apart()[side])
     own = f"{LIMBS[kind][0]}_{side}"
     above = "thorax" if kind == "shoulder" else PROXIMAL[kind]
     above = above if above in poses.rotation else f"{above}_{side}"

@@ -17,6 +17,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.study.study import load_study
+from tests.program import Answer, Program
 
 
 def small(sexes: str = "M", seed: int = 3, **durations_s: float) -> StudyOptions:
@@ -33,7 +34,7 @@ def small(sexes: str = "M", seed: int = 3, **durations_s: float) -> StudyOptions
 
 @dataclass(frozen=True)
 class Run:
-    """A study and what stages made of it; units run in this process."""
+    """A study and what stages made of it; units run in this process, commands in their own."""
 
     study: Path
     out: Path
@@ -49,6 +50,13 @@ class Run:
         if self.out.exists():
             shutil.copytree(self.out, copy.out)
         return copy
+
+    def call(self, command: str, *options: object) -> Answer:
+        return Program()(command, self.study, "--out", self.out, *options)
+
+    def done(self, command: str, *options: object) -> Answer:
+        """Of a call that must succeed."""
+        return Program().done(command, self.study, "--out", self.out, *options)
 
     def config(self) -> Config:
         return load_config([self.study / "study.toml"])

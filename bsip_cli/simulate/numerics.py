@@ -110,12 +110,21 @@ def integral(values: np.ndarray, step_s: float) -> np.ndarray:
     return make_interp_spline(t, values, k=5).antiderivative()(t)
 
 
-def response(
-    numerator: list[float], denominator: list[float], values: np.ndarray, step_s: float
-) -> np.ndarray:
-    """(T, 3) response of a linear system at rest to values that are linear between samples."""
-    b, a, _ = cont2discrete((numerator, denominator), step_s, method="foh")
-    return lfilter(np.ravel(b), a, values, axis=0)
+def swung(
+    frequency_hz: float, damping_ratio: float, acceleration: np.ndarray, step_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of a mass that hangs on a spring and a damper at a point with this acceleration (T, 3),
+    linear between samples: its displacement (T, 3) against the point, and its own acceleration.
+
+    The displacement u obeys u'' + 2 z w u' + w^2 u = -r'' from rest.
+    """
+    w, z = 2.0 * np.pi * frequency_hz, damping_ratio
+    found = []
+    for numerator in ([-1.0], [2.0 * z * w, w * w]):
+        system = numerator, [1.0, 2.0 * z * w, w * w]
+        b, a, _ = cont2discrete(system, step_s, method="foh")
+        found.append(lfilter(np.ravel(b), a, acceleration, axis=0))
+    return found[0], found[1]
 
 
 def runs(mask: np.ndarray) -> list[slice]:

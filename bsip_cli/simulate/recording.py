@@ -16,7 +16,7 @@ from bsip_cli.segments import without_side
 from bsip_cli.simulate.balance import balanced, ground_wrench
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.moving import MOVEMENTS
-from bsip_cli.simulate.numerics import response, rotate, runs, transpose, unskew
+from bsip_cli.simulate.numerics import rotate, runs, swung, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import SIDES, Marker, Person, Swing, tissue_of
 from bsip_cli.simulate.plan import STEP_S, Plan, Poses
@@ -44,7 +44,7 @@ class Trial:
     time_s : (T,) on the recording's clock.
     poses : of all bodies.
     force_n, moment_nm : (T, 3) total ground wrench on the body, moment about the origin.
-    feet_force_n, feet_moment_nm : the same by side; both feet sum to the total.
+    feet : the same by side; both feet sum to the total.
     on_plate : (T,) by side: whether the foot's contact (if any) is on the first plate.
     """
 
@@ -52,27 +52,20 @@ class Trial:
     poses: Poses
     force_n: np.ndarray
     moment_nm: np.ndarray
-    feet_force_n: dict[str, np.ndarray]
-    feet_moment_nm: dict[str, np.ndarray]
+    feet: dict[str, tuple[np.ndarray, np.ndarray]]
     on_plate: dict[str, np.ndarray]
     contacts: tuple[Contact, ...]
     plan: Plan
 
     def all_contacts_measured(self) -> np.ndarray:
         """(T,) no foot on the ground beside the plate."""
-        on_ground = {side: np.abs(self.feet_force_n[side]).max(axis=1) > 0.0 for side in SIDES}
+        on_ground = {side: force.any(axis=1) for side, (force, _) in self.feet.items()}
         return ~np.any([on_ground[side] & ~self.on_plate[side] for side in SIDES], axis=0)
 
-    def feet_wrenches(self, apart: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Force and moment (T, 3) of each foot; ``apart``: with the push between them.
-
-        The push acts along the line between the feet's centres of pressure, so that nobody but the
-        plates feels it.
-        """
-        feet = {side: (self.feet_force_n[side], self.feet_moment_nm[side]) for side in SIDES}
-        if not apart:
-            return feet
-        centres = {}
+    def feet_apart(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """The feet's wrenches with what they push against each other, along the line between their
+        centres of pressure, so that nobody but the plates feels it."""
+        feet, centres = dict(self.feet), {}
         for side, (force, moment) in feet.items():  # on the floor; Y is up
             load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
             ahead, aside = moment[:, 2] / load, -moment[:, 0] / load
@@ -116,12 +109,11 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
     keep = plan.keep
     wrench = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
     force, moment = (part[keep] for part in wrench)
-    planned, feet_force, feet_moment, contacts = plan.cop_m()[keep], {}, {}, []
+    planned, feet, contacts = plan.cop_m()[keep], {}, []
     for side, foot in plan.feet.items():
         share, aside = foot.share[keep, None], foot.cop_m[keep] - planned
         lever = np.stack([aside[:, 0], np.zeros(len(aside)), aside[:, 1]], axis=1)
-        feet_force[side] = share * force
-        feet_moment[side] = share * moment + np.cross(lever, feet_force[side])
+        feet[side] = share * force, share * moment + np.cross(lever, share * force)
         for part in runs(foot.share[keep] > 1e-9):  # the loaded intervals
             start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
             ahead, across = foot.cop_m[keep][part].mean(axis=0).tolist()
@@ -132,8 +124,7 @@ def trial_of(person: Person, plan: Plan, poses: Poses) -> Trial:
         poses=poses.part(keep),
         force_n=force,
         moment_nm=moment,
-        feet_force_n=feet_force,
-        feet_moment_nm=feet_moment,
+        feet=feet,
         on_plate={side: foot.on_plate[keep] for side, foot in plan.feet.items()},
         contacts=tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side))),
         plan=plan,
@@ -194,9 +185,8 @@ def _late(marker: Marker, swing: Swing | None, path: np.ndarray, rate_hz: float)
     if swing is None:
         width = LAG_SMOOTHING_S * rate_hz
         return -marker.lag_s2 * gaussian_filter1d(acceleration, width, axis=0, mode="nearest")
-    w, z = 2.0 * np.pi * swing.frequency_hz, swing.damping_ratio
-    denominator = [1.0, 2.0 * z * w, w * w]
-    return marker.swing_share * response([-1.0], denominator, acceleration, 1.0 / rate_hz)
+    travel, _ = swung(swing.frequency_hz, swing.damping_ratio, acceleration, 1.0 / rate_hz)
+    return marker.swing_share * travel
 
 
 def _with_gaps(
@@ -305,7 +295,7 @@ def plate_wrenches(
     apart : whether a plate feels one foot only, and so what the feet push against each other.
     """
     wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
-    feet = trial.feet_wrenches(apart)
+    feet = trial.feet_apart() if apart else trial.feet
     for contact in trial.contacts:
         ahead, aside = contact.cop_m
         place = pose.points(np.array([ahead, 0.0, aside]))

@@ -187,7 +187,7 @@ def _trial_record(
     plan, ball = trial.plan, trial.plan.ball
     times, length = plan.recorded_times_s(), len(trial.time_s) * plan.step_s
     spans = [(times[first], times[last]) for first, last in plan.flights]
-    on_plate_n = [trial.on_plate[s] * force[:, 1] for s, force in trial.feet_force_n.items()]
+    on_plate_n = [trial.on_plate[side] * force[:, 1] for side, (force, _) in trial.feet.items()]
     of_the_ball = ("mass_kg", "position_m", "release_s")
     of_a_contact = ("side", "start_s", "end_s", "on_plate")
     return {

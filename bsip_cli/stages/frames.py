@@ -170,7 +170,7 @@ def load_phi(unit: Unit, person: Person, trial: Trial | None = None) -> np.ndarr
     return load_parameters([(x.segment, x.mass_kg, x.position_m) for x in loads], person)
 
 
-def load_words(unit: Unit, trial: Trial | None = None) -> str:
+def load_words(unit: Unit, trial: Trial) -> str:
     """``1 kg on the right shank and 2 kg on the upper torso``; empty without loads."""
     loads = unit.loads(trial)
     return listing([f"{x.mass_kg:g} kg on the {segment_label(x.segment)}" for x in loads], "")

@@ -1,40 +1,20 @@
-"""The command as a user calls it, and a study folder that is cheap to make."""
+"""The command, and a study folder that is cheap to make."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-PARTICIPANTS = "participant_id\tsex\tmass_kg\theight_m\nsub-01\tM\t70\t1.80\nsub-02\tF\t60\tn/a\n"
+from tests.program import Program
 
-
-@dataclass(frozen=True)
-class Answer:
-    """What a call of the command left behind."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def summary(self) -> str:
-        """The last line, which counts what became of the units."""
-        return self.err.splitlines()[-1]
+COLUMNS = "participant_id\tsex\tmass_kg\theight_m"
 
 
 @pytest.fixture(scope="session")
-def bsip() -> Callable[..., Answer]:
-    def call(*arguments: object) -> Answer:
-        command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        return Answer(done.returncode, done.stdout, done.stderr)
-
-    return call
+def bsip() -> Program:
+    return Program()
 
 
 @pytest.fixture
@@ -54,12 +34,22 @@ def failing(monkeypatch) -> Callable[[str, Callable[[Path], bool], OSError], Non
     return make
 
 
+def write_table(root: Path, *lines: str) -> None:
+    """participants.tsv, with a line for each."""
+    (root / "participants.tsv").write_text("\n".join([COLUMNS, *lines, ""]))
+
+
+def make_people(root: Path, count: int) -> None:
+    """Folders of participants, in each a recording that holds nothing."""
+    for name in (f"sub-{k:02d}" for k in range(1, count + 1)):
+        (root / name).mkdir(parents=True, exist_ok=True)
+        (root / name / f"{name}_task-static.c3d").write_bytes(b"")
+
+
 @pytest.fixture
 def empty_study(tmp_path) -> Path:
     """Two participants whose recordings hold nothing."""
     root = tmp_path / "study"
-    for name in ("sub-01", "sub-02"):
-        (root / name).mkdir(parents=True)
-        (root / name / f"{name}_task-static.c3d").write_bytes(b"")
-    (root / "participants.tsv").write_text(PARTICIPANTS)
+    make_people(root, 2)
+    write_table(root, "sub-01\tM\t70\t1.80", "sub-02\tF\t60\tn/a")
     return root

@@ -8,6 +8,7 @@ from pathlib import Path
 import ezc3d
 import pytest
 
+from tests.cli.conftest import write_table
 from tests.fuzz.fuzz_study import _write_trc_mot
 
 SAMPLE = Path(__file__).parents[2] / "sample_data"
@@ -20,8 +21,7 @@ def study(tmp_path) -> Path:
     folder.mkdir(parents=True)
     for name in ("static", "squat_run-1"):
         shutil.copy(SAMPLE / "sub-01" / f"sub-01_task-{name}.c3d", folder)
-    table = "participant_id\tsex\tmass_kg\theight_m\nsub-01\tM\tn/a\tn/a\n"
-    (tmp_path / "study" / "participants.tsv").write_text(table)
+    write_table(tmp_path / "study", "sub-01\tM\tn/a\tn/a")
     return tmp_path / "study"
 
 

@@ -85,7 +85,7 @@ def test_a_simulated_kilogram_comes_back(bsip, tmp_path):
         if run > 1:
             shutil.move(root / "sub-01" / name, study / "sub-01" / name)
     for stage in ("ingest", "scale", "ik", "regress"):
-        assert bsip(stage, study, "--out", out).code == 0
+        bsip.done(stage, study, "--out", out)
     truth = json.loads((tmp_path / "study-2" / "truth" / "sub-01_truth.json").read_text())
     position = truth["effects"][0]["position_m"]
 
@@ -94,8 +94,7 @@ def test_a_simulated_kilogram_comes_back(bsip, tmp_path):
         config.write_text("".join(loads))
         who = ("--participant", "sub-01", "--config", config)
         sets = ("--with", f"sequence_run-{run}", "--without", "sequence_run-1")
-        answer = bsip("compare-loads", study, "--out", out, *who, *sets)
-        assert answer.code == 0, answer.err
+        answer = bsip.done("compare-loads", study, "--out", out, *who, *sets)
         assert "whole body" in answer.out
         assert ("the mass may be zero" in answer.out) == (run == 3)
         path = out / "sub-01" / "sub-01_load-comparison.parquet"

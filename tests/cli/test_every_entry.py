@@ -323,25 +323,11 @@ def test_a_note_is_no_fault(empty_study, folder, tmp_path):
 # --- sessions as in BIDS: sub-01/ses-2/sub-01_ses-2_task-walking_run-1.c3d ------------------------
 
 
-ROLES = {"static": ("static",), "sequence": ("sequence",)}
-
-
-def put(root: Path, *names: str) -> None:
-    for name in names:
-        path = root / "sub-01" / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(b"")
-
-
-def trials_of(root: Path) -> tuple[list[Trial], list[str]]:
-    study, refusals = load_study(root, ROLES, ["sub-01"])
-    return list(study.participants[0].trials), [str(refusal) for refusal in refusals]
-
-
-def test_trials_know_their_session(empty_study):
+def test_trials_know_their_session(empty_study, folder):
     first, second = "ses-2/sub-01_ses-2_task-sequence_run-1", "ses-pre/sub-01_ses-pre_task-w"
-    put(empty_study, f"{first}.c3d", f"{second}.trc", f"{second}_grf.mot")
-    trials, refusals = trials_of(empty_study)
+    make(folder, "ses-2/", "ses-pre/", f"{first}.c3d", f"{second}.trc", f"{second}_grf.mot")
+    study, refusals = load(empty_study)
+    trials = study.participants[0].trials
     assert refusals == []
     assert [(t.session, t.task, t.run, t.role) for t in trials] == [
         ("2", "sequence", 1, "sequence"),
@@ -351,9 +337,9 @@ def test_trials_know_their_session(empty_study):
     assert trials[1].files[1].name == "sub-01_ses-pre_task-w_grf.mot"
 
 
-def test_artifacts_of_all_sessions_lie_with_their_participant(empty_study):
-    put(empty_study, "ses-2/sub-01_ses-2_task-walking_run-1.c3d")
-    study, _ = load_study(empty_study, ROLES)
+def test_artifacts_of_all_sessions_lie_with_their_participant(empty_study, folder):
+    make(folder, "ses-2/", "ses-2/sub-01_ses-2_task-walking_run-1.c3d")
+    study, _ = load(empty_study)
     person = study.participants[0]
     unit = Unit(STAGES[0], study, Path("out"), load_config([]), person, person.trials[0])
     name = "sub-01_ses-2_task-walking_run-1"
@@ -375,19 +361,20 @@ def test_artifacts_of_all_sessions_lie_with_their_participant(empty_study):
         ("ses-2/sub-01_ses-2_task-walk.mot", "forces without markers"),
     ],
 )
-def test_what_cannot_be_used_in_a_session(empty_study, name, said):
-    put(empty_study, name)
-    trials, (refusal,) = trials_of(empty_study)
-    assert [trial.task for trial in trials] == ["static"]
-    assert refusal.startswith(str(empty_study / "sub-01" / name))
+def test_what_cannot_be_used_in_a_session(empty_study, folder, name, said):
+    make(folder, "ses-2/", name)
+    study, (refusal,) = load(empty_study)
+    assert [trial.stem for trial in study.participants[0].trials] == ["sub-01_task-static"]
+    assert refusal.startswith(str(folder / name))
     assert said in refusal
 
 
-def test_a_participant_who_has_sessions_only(empty_study):
-    (empty_study / "sub-01" / "sub-01_task-static.c3d").unlink()
-    put(empty_study, "ses-1/sub-01_ses-1_task-walk.c3d", "ses-2/sub-01_ses-2_task-walk.c3d")
-    trials, refusals = trials_of(empty_study)
-    assert ([trial.session for trial in trials], refusals) == (["1", "2"], [])
+def test_a_participant_who_has_sessions_only(empty_study, folder):
+    (folder / "sub-01_task-static.c3d").unlink()
+    make(folder, "ses-1/", "ses-2/", *(f"ses-{k}/sub-01_ses-{k}_task-walk.c3d" for k in "12"))
+    study, refusals = load(empty_study)
+    assert refusals == []
+    assert [trial.session for trial in study.participants[0].trials] == ["1", "2"]
 
 
 def test_labels_tell_sessions_apart():

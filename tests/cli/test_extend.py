@@ -31,22 +31,21 @@ UNITS = 1 + 3 + 1
 EXTEND = [stage.label for stage in STAGES if stage.name == "extend"]
 
 
-def run_of(options: StudyOptions, folder: Path, bsip) -> Run:
+def run_of(options: StudyOptions, folder: Path) -> Run:
     run = Run.within(folder)
     simulate_study(run.study, options)
-    answer = bsip("run", run.study, "--out", run.out)
-    assert answer.code == 0, answer.err
+    run.done("run")
     return run
 
 
 @pytest.fixture(scope="module")
-def late_run(tmp_path_factory, bsip) -> Run:
-    return run_of(LATE, tmp_path_factory.mktemp("late"), bsip)
+def late_run(tmp_path_factory) -> Run:
+    return run_of(LATE, tmp_path_factory.mktemp("late"))
 
 
 @pytest.fixture(scope="module")
-def null_run(tmp_path_factory, bsip) -> Run:
-    return run_of(NULL, tmp_path_factory.mktemp("null"), bsip)
+def null_run(tmp_path_factory) -> Run:
+    return run_of(NULL, tmp_path_factory.mktemp("null"))
 
 
 @pytest.fixture
@@ -126,25 +125,25 @@ def test_what_the_delay_had_done_to_the_body(late_run):
 # --- what runs again ----------------------------------------------------------------------------
 
 
-def test_second_run_does_nothing_and_a_forced_one_the_same(run, bsip):
+def test_second_run_does_nothing_and_a_forced_one_the_same(run):
     before = content(run)
-    answer = bsip("run", run.study, "--out", run.out)
+    answer = run.call("run")
     assert " done" not in answer.summary
-    answer = bsip("extend", run.study, "--out", run.out)
+    answer = run.call("extend")
     assert answer.summary.startswith(f"bsip extend: {UNITS} up to date;")
-    answer = bsip("extend", run.study, "--out", run.out, "--force")
+    answer = run.call("extend", "--force")
     assert answer.summary.startswith(f"bsip extend: {UNITS} done;")
     assert content(run) == before
 
 
-def test_reconstruct_stays_fresh_and_is_noticed(run, bsip):
+def test_reconstruct_stays_fresh_and_is_noticed(run):
     before = content(run)
     assert run.perform("reconstruct (trial)", SQUAT).state == "fresh"
     header = run.provenance("fit", SQUAT)
     assert (header["made_by"]["stage"], header["amended_by"]["stage"]) == ("reconstruct", "extend")
-    assert bsip("reconstruct", run.study, "--out", run.out, "--force").code == 0
+    run.done("reconstruct", "--force")
     assert extended(run.read("fit", SQUAT)) == []
-    answer = bsip("extend", run.study, "--out", run.out)
+    answer = run.call("extend")
     assert answer.summary.startswith("bsip extend: 3 done, 2 up to date;")
     assert content(run) == before
 

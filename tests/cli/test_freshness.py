@@ -10,8 +10,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -46,14 +44,8 @@ print(json.dumps(loaded))
 """
 
 
-@dataclass(frozen=True)
 class Done(Run):
-    """Called as a user does."""
-
-    bsip: Callable
-
-    def call(self, stage: str, *options: object):
-        return self.bsip(stage, self.study, "--out", self.out, *options)
+    """As far as `regress`."""
 
     def recording(self, who: str) -> Path:
         return self.study / who / f"{who}_task-static.c3d"
@@ -63,13 +55,12 @@ class Done(Run):
 
 
 @pytest.fixture(scope="module")
-def first(tmp_path_factory, bsip) -> Done:
+def first(tmp_path_factory) -> Done:
     """Made once; nobody changes it."""
-    folder = tmp_path_factory.mktemp("fresh")
-    done = Done(folder / "study", folder / "out", bsip)
+    done = Done.within(tmp_path_factory.mktemp("fresh"))
     simulate_study(done.study, OPTIONS)
     for stage in DONE:
-        assert done.call(stage).code == 0
+        done.done(stage)
     return done
 
 
@@ -217,7 +208,7 @@ def test_a_stage_alone_says_what_is_stale_before_it(done, tmp_path):
 def test_verify_finds_what_a_forged_memory_hides(done):
     """Somebody edits an artifact and writes its new times beside the old hash."""
     path = done.path("regression")
-    assert done.call("regress").code == 0  # the copy's own inodes are known now
+    done.done("regress")  # the copy's own inodes are known now
     content = path.read_bytes()
     flip_a_bit(path)
     kept = json.loads(done.memory().read_text())

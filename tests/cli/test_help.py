@@ -36,8 +36,7 @@ def test_imports_nothing_heavy(command):
 
 
 def test_lists_every_command(bsip):
-    answer = bsip("--help")
-    assert answer.code == 0
+    answer = bsip.done("--help")
     listed = [line.split()[0] for line in answer.out.partition("Commands:\n")[2].splitlines()]
     assert sorted(listed) == sorted(STAGE_COMMANDS + OTHER.split())
     assert sorted(cli.commands) == sorted(listed)
@@ -77,8 +76,7 @@ def test_version_and_info(bsip):
 
 
 def test_audit_prints_every_paper(bsip):
-    answer = bsip("published", "audit")
-    assert answer.code == 0
+    answer = bsip.done("published", "audit")
     for name in ("Hansen 2014", "Hansen 2017", "Robert 2017"):
         assert f"**{name}: " in answer.out
     assert "AP RM (12.69(4.82)) and ML OM (88.67(11.03)) are exchanged" in answer.out
@@ -86,8 +84,7 @@ def test_audit_prints_every_paper(bsip):
 
 
 def test_show_prints_the_tables_as_they_are(bsip):
-    answer = bsip("published", "show", "hansen2017")
-    assert answer.code == 0
+    answer = bsip.done("published", "show", "hansen2017")
     assert answer.out.count(", as printed.**") == 4
     assert "3.84(1.49)" in answer.out
     assert "Robert" not in answer.out

@@ -88,9 +88,8 @@ def test_links(lab):
 
 def test_what_comes_out_is_ingested(bsip, lab):
     out = lab.parent / "study"
-    assert bsip("init", lab, "--out", out, "--participant", "P7").code == 0
-    answer = bsip("ingest", out, "--out", out / "derivatives" / "bsip")
-    assert answer.code == 0, answer.err
+    bsip.done("init", lab, "--out", out, "--participant", "P7")
+    answer = bsip.done("ingest", out, "--out", out / "derivatives" / "bsip")
     assert answer.summary.startswith("bsip ingest: 4 done")  # three trials, one session
 
 
@@ -251,7 +250,7 @@ def test_real_recordings(bsip, tmp_path, name, people, n_static, marker_set):
     if not (DATA / name).is_dir():
         pytest.skip("the real recordings (../shared/data) are missing")
     out = tmp_path / "study"
-    assert bsip("init", DATA / name, "--out", out, "--link").code == 0
+    bsip.done("init", DATA / name, "--out", out, "--link")
     if people is not None:
         assert (out / "participants.tsv").read_text().splitlines()[1:] == people
     assert sum(trial.endswith(" static") for trial in trials(out)) == n_static

@@ -16,12 +16,12 @@ def rows_of(bsip, folder, *hidden):
     """The laboratory's table of people of whom the simulator writes C3D only."""
     people = ("--preset", "sample", "--participants", 4, "--task", "walking")
     study, more, out = folder / "study", folder / "more", folder / "out"
-    assert bsip("simulate", study, *people, "--task", "static", *hidden).code == 0
-    assert bsip("simulate", more, *people, "--run", 2, *hidden).code == 0
+    bsip.done("simulate", study, *people, "--task", "static", *hidden)
+    bsip.done("simulate", more, *people, "--run", 2, *hidden)
     for walk in more.glob("sub-*/*walking*"):
         shutil.copy(walk, study / walk.parent.name)
     for stage in STAGES:
-        assert bsip(stage, study, "--out", out).code == 0
+        bsip.done(stage, study, "--out", out)
     return read_artifact(out / "group" / "group_laboratory.parquet", "laboratory")
 
 

@@ -35,8 +35,7 @@ def fitted(tmp_path_factory, bsip):
         root = tmp_path_factory.mktemp("-".join(("off", *tasks)))
         simulate_study(root / "study", options(*tasks))
         for stage in ("ingest", "scale", "ik"):
-            answer = bsip(stage, root / "study", "--out", root / "out", "--jobs", 1)
-            assert answer.code == 0, answer.err
+            bsip.done(stage, root / "study", "--out", root / "out", "--jobs", 1)
         return root / "out" / "sub-01"
 
     return fit

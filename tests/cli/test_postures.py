@@ -21,8 +21,7 @@ def study(bsip, tmp_path_factory) -> Path:
     """The simulator's forces are the rate of momentum of its bodies: none of bsip's equations."""
     folder = tmp_path_factory.mktemp("postures") / "study"
     tasks = [word for task in ("static", "squat", "postures") for word in ("--task", task)]
-    answer = bsip("simulate", folder, "--participants", PEOPLE, "--seed", 37501, *tasks)
-    assert answer.code == 0, answer.err
+    bsip.done("simulate", folder, "--participants", PEOPLE, "--seed", 37501, *tasks)
     return folder
 
 
@@ -31,8 +30,7 @@ def limbs(bsip, study: Path, *tasks: str) -> pd.DataFrame:
     out, options = study.with_name("out"), study.with_name("roles.toml")
     options.write_text(f"[roles]\nsequence = {json.dumps(tasks)}\n")
     for stage in STAGES:
-        answer = bsip(stage, study, "--out", out, "--config", options)
-        assert answer.code == 0, answer.err
+        bsip.done(stage, study, "--out", out, "--config", options)
     rows = []
     for number in range(1, PEOPLE + 1):
         sub = f"sub-{number:02d}"

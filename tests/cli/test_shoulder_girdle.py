@@ -22,8 +22,7 @@ def study(bsip, tmp_path_factory) -> Path:
     """51 markers, the shoulders raised and brought forward by up to 20 degrees."""
     folder = tmp_path_factory.mktemp("girdle") / "study"
     tasks = ("--task", "static", "--task", "sequence", "--sequence-s", 12)
-    answer = bsip("simulate", folder, "--participants", 1, "--seed", 1, *tasks, "--shoulder-girdle")
-    assert answer.code == 0, answer.err
+    bsip.done("simulate", folder, "--participants", 1, "--seed", 1, *tasks, "--shoulder-girdle")
     settings = folder / "study.toml"
     settings.write_text(settings.read_text() + IDENTIFY)
     return folder
@@ -32,8 +31,7 @@ def study(bsip, tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def out(bsip, study) -> Path:
     folder = study.parent / "out"
-    answer = bsip("run", study, "--out", folder, "--jobs", 1)
-    assert answer.code == 0, answer.err
+    bsip.done("run", study, "--out", folder, "--jobs", 1)
     return folder
 
 
@@ -67,8 +65,7 @@ def test_the_clavicles_move_as_they_do(out):
 
 
 def test_models_of_17_links_weigh_what_the_person_does(bsip, study, out):
-    answer = bsip("export", study, "--out", out, "--method", "OM")
-    assert answer.code == 0, answer.err
+    bsip.done("export", study, "--out", out, "--method", "OM")
     files = {path.suffix for path in (out / "sub-01" / "export").iterdir()}
     assert files == {".urdf", ".xml", ".osim", ".bioMod", ".csv"}
     model = pin.buildModelFromUrdf(
@@ -99,8 +96,7 @@ def test_both_errors_are_half_of_those_of_fixed_shoulders(bsip, study, out):
     shutil.copytree(study, plain)
     (plain / "study.toml").write_text('marker_set = "robert17"\n' + IDENTIFY)
     for stage in ("ingest", "scale", "ik", "regress", "identify", "reconstruct"):
-        answer = bsip(stage, plain, "--out", plain.parent / "plain_out", "--jobs", 1)
-        assert answer.code == 0, answer.err
+        bsip.done(stage, plain, "--out", plain.parent / "plain_out", "--jobs", 1)
     (residual, wrench), (other_residual, other_wrench) = map(
         errors, (out, plain.parent / "plain_out")
     )

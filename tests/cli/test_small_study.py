@@ -98,13 +98,12 @@ def options_in(folder: Path, text: str) -> Path:
 
 
 @pytest.fixture(scope="session")
-def first_run(tmp_path_factory, bsip):
+def first_run(tmp_path_factory):
     """Made once; nobody changes it."""
     folder = tmp_path_factory.mktemp("small")
     simulate_study(folder / "study", OPTIONS)
     run = WholeRun.within(folder)
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0, answer.err
+    answer = run.done("run", "--jobs", 2)
     assert answer.summary == f"bsip run: {UNITS} done; results in {run.out}"
     return run
 
@@ -148,10 +147,10 @@ def test_files_of_a_run(first_run):
 
 
 @pytest.mark.long
-def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):
+def test_two_runs_give_the_same_bytes(first_run, tmp_path):
     """Another folder, one process instead of two."""
     again = WholeRun(first_run.study, tmp_path / "elsewhere")
-    assert bsip("run", again.study, "--out", again.out, "--jobs", 1).code == 0
+    again.done("run", "--jobs", 1)
     assert again.changed(first_run.content()) == []
 
 
@@ -211,13 +210,11 @@ def sha256(path: Path) -> str:
 
 
 def test_show_prints_the_tables(first_run, bsip):
-    brief = bsip("show", first_run.out)
-    assert brief.code == 0
+    brief = bsip.done("show", first_run.out)
     assert len(brief.out.splitlines()) <= 24
     assert [f"sub-0{k}: " in brief.out for k in (1, 2)] == [True, True]
     assert "| " not in brief.out
-    answer = bsip("show", first_run.out, "--full")
-    assert answer.code == 0
+    answer = bsip.done("show", first_run.out, "--full")
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
@@ -225,8 +222,7 @@ def test_show_prints_the_tables(first_run, bsip):
 
 
 def test_methods_say_what_was_done(first_run, bsip, tmp_path):
-    answer = bsip("methods", first_run.out)
-    assert answer.code == 0
+    answer = bsip.done("methods", first_run.out)
     text = " ".join(answer.out.split())
     assert "Recordings of 2 persons (1 female and 1 male;" in text
     assert f"bsip {__version__}" in text
@@ -240,7 +236,7 @@ def test_methods_say_what_was_done(first_run, bsip, tmp_path):
 def test_methods_name_options_that_differ(run, bsip, tmp_path):
     other = options_in(tmp_path, "[reconstruct]\ncutoff_hz = 7.0\n")
     asked = ("--participant", "sub-01", "--config", other)
-    assert bsip("reconstruct", run.study, "--out", run.out, *asked).code == 0
+    run.done("reconstruct", *asked)
     text = " ".join(bsip("methods", run.out).out.split())
     assert "Options that differ among the results (the text gives the first): reconstruct." in text
     assert "below 7.0 Hz" in text
@@ -280,10 +276,9 @@ def test_the_library_gives_the_same_tables(first_run):
 
 
 @pytest.mark.parametrize("what", ["joints", "opensim", "bids"])
-def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
+def test_every_trial_is_exported(first_run, tmp_path, what):
     to = tmp_path / "to"
-    answer = bsip("export", first_run.study, "--out", first_run.out, "--what", what, "--to", to)
-    assert answer.code == 0, answer.err
+    answer = first_run.done("export", "--what", what, "--to", to)
     names = {path.relative_to(to).as_posix() for path in to.rglob("*") if path.is_file()}
     if what == "bids":
         assert {"dataset_description.json", "participants.tsv"} < names
@@ -312,8 +307,7 @@ def _models(run: Run) -> list[str]:
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):
     path = first_run.path("bsip")
-    answer = bsip("info", path)
-    assert answer.code == 0
+    answer = bsip.done("info", path)
     lines = answer.out.splitlines()
     assert lines[0] == path.name
     assert lines[1].startswith("kind      bsip, version 1: ")
@@ -326,32 +320,30 @@ def test_info_tells_what_made_an_artifact(first_run, bsip):
 # --- what runs again ----------------------------------------------------------------------------
 
 
-def test_second_run_does_nothing(run, bsip):
+def test_second_run_does_nothing(run):
     content, times = run.content(), run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0
+    answer = run.done("run", "--jobs", 2)
     assert answer.err.splitlines() == [f"bsip run: {UNITS} up to date; results in {run.out}"]
     assert answer.out == ""
     assert run.times() == times
     assert run.content() == content
 
 
-def test_touched_recording_is_the_same_recording(run, bsip):
+def test_touched_recording_is_the_same_recording(run):
     times = run.times()
     for path in run.study.rglob("*.c3d"):
         os.utime(path)
-    answer = bsip("ingest", run.study, "--out", run.out)
+    answer = run.call("ingest")
     assert answer.summary.startswith("bsip ingest: 8 up to date;")
     assert run.times() == times
 
 
 @pytest.mark.long
-def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
+def test_changed_recording_runs_again_with_what_reads_it(run):
     with run.recording("sub-01_task-squat_run-1").open("ab") as handle:
         handle.write(bytes(512))
     times = run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
-    assert answer.code == 0
+    run.done("run", "--jobs", 2)
     rewritten = run.rewritten(times)
     trials = {f"sub-01_{trial}" for trial in TRIALS}  # all read what the session was made of
     assert owners_of(rewritten, "ingest") == {"sub-01", *trials}
@@ -361,11 +353,11 @@ def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
     assert not any("sub-02" in name for name in rewritten)
 
 
-def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
+def test_changed_option_reruns_its_stage_and_its_readers(run, tmp_path):
     own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
-    answer = bsip("run", run.study, "--out", run.out, *chosen)
+    answer = run.call("run", *chosen)
     assert answer.summary.startswith("bsip run: 18 done, 10 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
@@ -385,10 +377,10 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     assert made_by["options"]["reconstruct"]["cop_min_force_percent_bw"] == 31.0
 
 
-def test_changed_option_of_the_cohort(run, bsip, tmp_path):
+def test_changed_option_of_the_cohort(run, tmp_path):
     own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
     times = run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--config", own)
+    answer = run.call("run", "--config", own)
     assert answer.summary.startswith(f"bsip run: 3 done, {UNITS - 3} up to date;")
     group = {"stats (cohort)", "tables (cohort)", "report (cohort)"}
     assert stages_of(run.rewritten(times)) == group
@@ -414,9 +406,9 @@ def test_joint_moments_of_whom_nothing_was_identified(run):
     assert set(run.read("joint-moments", stem)["method"]) == {"RM", "RM+mass"}
 
 
-def test_force_redoes_with_the_same_result(run, bsip):
+def test_force_redoes_with_the_same_result(run):
     content, times = run.content(), run.times()
-    answer = bsip("regress", run.study, "--out", run.out, "--force")
+    answer = run.call("regress", "--force")
     assert answer.summary.startswith("bsip regress: 2 done;")
     assert owners_of(run.rewritten(times), "regress") == {"sub-01", "sub-02"}
     assert stages_of(run.rewritten(times)) == {"regress (participant)"}
@@ -483,13 +475,13 @@ def test_lost_or_edited_page_is_made_again_and_that_is_said(run, change, name):
 
 
 @pytest.mark.parametrize("command", [("stats",), ("run", "--group")], ids=" ".join)
-def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
+def test_who_is_stale_is_left_out_of_the_group_and_named(run, command):
     """Heavier by a kilogram in participants.tsv; then as before, and all is as before."""
     table, content, times = run.study / "participants.tsv", run.content(), run.times()
     before = pd.read_csv(table, sep="\t")
     heavier = before["mass_kg"] + [0.0, 1.0]
     before.assign(mass_kg=heavier).to_csv(table, sep="\t", index=False, na_rep="n/a")
-    answer = bsip(command[0], run.study, "--out", run.out, *command[1:])
+    answer = run.call(command[0], *command[1:])
     assert answer.code == 3
     first = {"stats": "stats", "run": "laboratory"}[command[0]]
     assert answer.err.splitlines()[0] == (
@@ -499,14 +491,14 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
     assert set(run.read("values", "group")["participant"]) == {"sub-01"}
     assert all(name.startswith("group/") for name in run.rewritten(times))
     before.to_csv(table, sep="\t", index=False, na_rep="n/a")
-    assert bsip("run", run.study, "--out", run.out, "--group").code == 0
+    run.done("run", "--group")
     assert run.content() == content
 
 
-def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
+def test_all_are_left_out_of_the_group(run, tmp_path):
     own = options_in(tmp_path, "[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
-    answer = bsip("run", run.study, "--out", run.out, "--config", own, "--group")
+    answer = run.call("run", "--config", own, "--group")
     assert answer.code == 3
     lines = answer.err.splitlines()
     because = " is not up to date (other options (reconstruct)); run `bsip run` first"
@@ -517,15 +509,14 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
     assert stages_of(run.rewritten(times)) == set()
 
 
-def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_path):
+def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, tmp_path):
     own = options_in(tmp_path, "[stats]\nalpha = 0.04\n")
-    answer = bsip("tables", run.study, "--out", run.out, "--config", own)
-    assert answer.code == 0
+    answer = run.done("tables", "--config", own)
     assert answer.err.splitlines()[0] == (
         "tables: group: what `bsip stats` made of group is not up to date "
         "(other options (stats)); `bsip run` brings it up to date"
     )
-    answer = bsip("tables", run.study, "--out", run.out)
+    answer = run.call("tables")
     assert answer.err.startswith("bsip tables: 1 ")
 
 
@@ -533,12 +524,12 @@ def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_
 
 
 @pytest.mark.long
-def test_corrupt_recording_and_its_return(run, bsip, first_run):
+def test_corrupt_recording_and_its_return(run, first_run):
     """The rest goes on without it; mended, everything is as if nothing had been."""
     recording = run.recording("sub-01_task-squat_run-1")
     whole, times = recording.read_bytes(), run.times()
     recording.write_bytes(whole[:1000])
-    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
+    answer = run.call("run", "--jobs", 2)
     assert answer.code == 3
     assert "Traceback" not in answer.err
     (sentence,) = [line for line in answer.err.splitlines() if str(recording) in line]
@@ -555,17 +546,17 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     assert "sub-01_task-squat_run-1" not in set(run.read("values", "group")["trial"])
 
     recording.write_bytes(whole)
-    assert bsip("run", run.study, "--out", run.out, "--jobs", 2).code == 0
+    run.done("run", "--jobs", 2)
     assert run.changed(first_run.content()) == []
 
 
-def test_refused_recording_that_is_taken_out(run, bsip):
+def test_refused_recording_that_is_taken_out(run):
     recording = run.recording("sub-01_task-squat_run-1")
     recording.write_bytes(b"")
-    assert bsip("ingest", run.study, "--out", run.out).code == 3
+    assert run.call("ingest").code == 3
     assert run.path("refusal-ingest", recording.stem).exists()
     recording.unlink()
-    assert bsip("ingest", run.study, "--out", run.out).code == 0
+    run.done("ingest")
     assert not run.path("refusal-ingest", recording.stem).exists()
 
 
@@ -632,24 +623,23 @@ def test_place_that_cannot_be_written_is_no_refusal_of_the_data(run):
     assert not [each for each in path.parent.iterdir() if each.name.endswith(".part")]
 
 
-def test_nothing_is_made_without_what_could_not_be_written(run, bsip):
+def test_nothing_is_made_without_what_could_not_be_written(run):
     """A trial lost to a full disk would else be missing in what is made of the others."""
     path = run.path("wrench", f"sub-01_{TRIALS[1]}")
     path.unlink()
     path.mkdir()
     before = run.files()
-    answer = bsip("run", run.study, "--out", run.out, "--participant", "sub-01", "--force")
+    answer = run.call("run", "--participant", "sub-01", "--force")
     assert answer.code == 2
     assert answer.summary.startswith("bsip run: 2 done, 1 not to be written;")
     assert run.files() == before
 
 
-def test_warnings_are_told_and_kept(run, bsip):
+def test_warnings_are_told_and_kept(run):
     """A mass that the plates contradict: said on the terminal and in the artifact."""
     table = run.study / "participants.tsv"
     table.write_text(table.read_text().replace("\tM\t", "\tM\t1", 1))
-    answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
-    assert answer.code == 0
+    answer = run.done("scale", "--participant", "sub-01")
     (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
     assert "the plates measure" in told
     assert told.removeprefix("scale: ") in run.provenance("person")["messages"]
@@ -741,12 +731,12 @@ def residuals_seen(run: Run) -> np.ndarray:
 # --- two at once ---------------------------------------------------------------------------------
 
 
-def test_a_second_run_on_the_same_folder_is_refused(run, bsip):
+def test_a_second_run_on_the_same_folder_is_refused(run):
     """It says who is busy, changes nothing there, and does everybody else."""
     before = run.content()
     with held_alone(run.out / "sub-01"):
-        answer = bsip("run", run.study, "--out", run.out, "--force")
+        answer = run.call("run", "--force")
     assert answer.code == 2
     assert "sub-01: another bsip is writing there. To correct it: wait until" in answer.err
     assert not [name for name in run.changed(before) if "sub-01" in name]
-    assert bsip("run", run.study, "--out", run.out).code == 0
+    run.done("run")

@@ -11,14 +11,10 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.participants import named_in
 from bsip_cli.study.study import load_study
+from tests.cli.conftest import COLUMNS, make_people, write_table
 
 ROLES = {"static": ("static",), "sequence": ("sequence", "dance")}
-COLUMNS = "participant_id\tsex\tmass_kg\theight_m"
 HEADER = f"{COLUMNS}\n"
-
-
-def write_table(root: Path, *lines: str) -> None:
-    (root / "participants.tsv").write_text(HEADER + "\n".join(lines) + "\n")
 
 
 def load(root: Path):
@@ -260,9 +256,7 @@ def test_dialects(empty_study, table, said):
     ],
 )
 def test_feet_and_inches(empty_study, cells, taken, said):
-    for k in range(1, len(cells) + 1):
-        (empty_study / f"sub-{k:02d}").mkdir(exist_ok=True)
-        (empty_study / f"sub-{k:02d}" / f"sub-{k:02d}_task-static.c3d").write_bytes(b"")
+    make_people(empty_study, len(cells))
     rows = [f"sub-{k:02d} M {cell}".replace(" ", "\t") for k, cell in enumerate(cells, 1)]
     table = "\n".join(["id\tsex\tmass_kg\theight (ft)", *rows, ""])
     found, notes, refusals = people(empty_study, table)
@@ -310,9 +304,7 @@ def test_sexes(empty_study, sexes, legend, read):
 
 def sexes_of(root: Path, sexes: str, legend: str = "") -> tuple[list[str], list[str]]:
     rows = [f"sub-{k:02d}\t{sex}\t70\t1.7\n" for k, sex in enumerate(sexes.split(), 1)]
-    for k in range(1, len(rows) + 1):
-        (root / f"sub-{k:02d}").mkdir(exist_ok=True)
-        (root / f"sub-{k:02d}" / f"sub-{k:02d}_task-static.c3d").write_bytes(b"")
+    make_people(root, len(rows))
     table = f"participant_id\tsex{legend}\tmass_kg\theight_m\n" + "".join(rows)
     found, _, refusals = people(root, table)
     return [sex for sex, *_ in found], refusals

@@ -3,12 +3,12 @@ command line, which sees no truth."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
+
+from tests.program import Program
 
 pytestmark = pytest.mark.long
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose")
@@ -24,16 +24,11 @@ HIDDEN = [  # the number that is named, what it is within, and the person's seed
 ]
 
 
-def bsip(*arguments: str | Path) -> None:
-    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
 def said(folder: Path, seed: int, *hidden: str) -> pd.DataFrame:
     """What is named or in a group, of one person."""
     tasks = [word for task in TASKS for word in ("--task", task)]
     options = ("--preset", "diagnosis", "--seed", str(seed), "--sequence-s", "20", *tasks)
+    bsip = Program().done
     bsip("simulate", folder / "study", *options, *hidden)
     for stage in STAGES:
         bsip(stage, folder / "study", "--out", folder / "out")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,8 +22,10 @@ from bsip_cli.running.unit import file_hash
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table
 from bsip_cli.stages.scale import _marker_table, _skeleton_table
+from tests.cli.conftest import make_people, write_table
 from tests.exports.exported_person import identified_person
 from tests.exports.test_osim_given import draw, inertias_in
+from tests.program import Answer, Program
 
 ENDINGS = {".urdf", ".xml", ".osim", ".bioMod", ".csv"}
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
@@ -38,11 +38,8 @@ class Results:
     study: Path
     out: Path
 
-    def call(self, *arguments: object) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "bsip_cli", "export", self.study, "--out", self.out]
-        return subprocess.run(
-            list(map(str, [*command, *arguments])), capture_output=True, text=True, check=False
-        )
+    def call(self, *arguments: object) -> Answer:
+        return Program()("export", self.study, "--out", self.out, *arguments)
 
     def files(self) -> set[str]:
         return {p.relative_to(self.out).as_posix() for p in self.out.glob("*/export/*")}
@@ -83,17 +80,14 @@ def impossible(values: np.ndarray, segment: int) -> np.ndarray:
 
 @pytest.fixture
 def results(tmp_path) -> Results:
-    made = Results(tmp_path / "study", tmp_path / "out")
-    lines = ["participant_id\tsex\tmass_kg\theight_m"]
-    for name in ("sub-01", "sub-02"):
-        (made.study / name).mkdir(parents=True)
-        (made.study / name / f"{name}_task-static.c3d").write_bytes(b"")
-        lines.append(f"{name}\tM\t71.3\t1.77")
+    made, people = Results(tmp_path / "study", tmp_path / "out"), ("sub-01", "sub-02")
+    make_people(made.study, len(people))
+    write_table(made.study, *(f"{name}\tM\t71.3\t1.77" for name in people))
+    for name in people:
         write_person(made, name)
         values = readable(identified_person())
         made.write_inertias({"RM": values, "OM": values * 1.0}, name)
         write_choice(made, name)
-    (made.study / "participants.tsv").write_text("\n".join(lines) + "\n")
     return made
 
 
@@ -112,24 +106,24 @@ def write_person(made: Results, participant: str) -> None:
 
 def test_writes_every_format_of_everybody(results):
     done = results.call()
-    assert (done.returncode, done.stdout) == (0, "")
+    assert (done.code, done.out) == (0, "")
     wanted = {f"{s}/export/{s}_OM{e}" for s in ("sub-01", "sub-02") for e in ENDINGS}
     assert results.files() == wanted
-    why, first, *_, summary = done.stderr.splitlines()
+    why, first, *_, summary = done.err.splitlines()
     assert why.startswith("export: sub-01: By errors so far, OM: in 3")
     assert first.startswith(f"export: sub-01: {results.out / 'sub-01' / 'export'}: sub-01_OM.urdf")
     assert summary == f"bsip export: 2 done; results in {results.out}"
 
 
 def test_written_model_is_the_person_of_the_tables(results):
-    assert results.call("--participant", "sub-02", "--format", "urdf").returncode == 0
+    assert results.call("--participant", "sub-02", "--format", "urdf").code == 0
     file = results.out / "sub-02" / "export" / "sub-02_OM.urdf"
     model = pin.buildModelFromUrdf(str(file), pin.JointModelFreeFlyer())
     assert pin.computeTotalMass(model) == pytest.approx(identified_person().mass_kg, rel=1e-12)
 
 
 def test_every_file_says_what_made_it(results):
-    assert results.call("--method", "RM", "--participant", "sub-01").returncode == 0
+    assert results.call("--method", "RM", "--participant", "sub-01").code == 0
     for file in (results.out / "sub-01" / "export").iterdir():
         text = file.read_text(encoding="utf-8")
         assert f"bsip {__version__} export: participant sub-01, method RM" in text
@@ -141,7 +135,7 @@ def test_every_file_says_what_made_it(results):
 def test_the_choice_is_the_default_and_must_be_of_this_identification(results):
     write_choice(results, "sub-01", use="RM")
     only = ("--participant", "sub-01", "--format", "csv")
-    assert results.call(*only).returncode == 0
+    assert results.call(*only).code == 0
     assert results.files() == {"sub-01/export/sub-01_RM.csv"}
     choice = results.artifact("choice")
     notes = {"made_by": {"inputs": {choice.name: file_hash(choice)}}}
@@ -149,7 +143,7 @@ def test_the_choice_is_the_default_and_must_be_of_this_identification(results):
     page = empty_table("report-files")
     write_artifact(results.artifact("report-files"), "report-files", page, NOTES | notes)
     done = results.call(*only)  # as the page says
-    assert "sub-01: Use OM for now." in done.stderr and len(results.files()) == 2
+    assert "sub-01: Use OM for now." in done.err and len(results.files()) == 2
     write_artifact(
         results.artifact("identification"),
         "identification",
@@ -157,20 +151,20 @@ def test_the_choice_is_the_default_and_must_be_of_this_identification(results):
         NOTES | {"facts": {"made": "anew"}},
     )
     done = results.call(*only)
-    assert done.returncode == 2 and "run `bsip choose`" in done.stderr
-    assert results.call(*only, "--method", "OM").returncode == 0
+    assert done.code == 2 and "run `bsip choose`" in done.err
+    assert results.call(*only, "--method", "OM").code == 0
 
 
 def test_twice_gives_the_same_bytes_and_no_rest(results):
-    assert results.call().returncode == 0
+    assert results.call().code == 0
     before = {name: (results.out / name).read_bytes() for name in results.files()}
-    assert results.call().returncode == 0
+    assert results.call().code == 0
     assert {name: (results.out / name).read_bytes() for name in results.files()} == before
 
 
 def test_only_what_is_asked_for(results):
     done = results.call("--participant", "sub-01", "--format", "csv", "--format", "mjcf")
-    assert done.returncode == 0
+    assert done.code == 0
     assert results.files() == {"sub-01/export/sub-01_OM.csv", "sub-01/export/sub-01_OM.xml"}
 
 
@@ -187,8 +181,8 @@ def test_given_model_gets_the_inertias(results, tmp_path):
     given = tmp_path / "given.osim"
     given.write_text(draw(identified_person(), arms=True).text, encoding="utf-8")
     done = results.call("--participant", "sub-01", "--format", "osim", "--model-file", given)
-    assert done.returncode == 0
-    assert "sub-01: given.osim, map rajagopal: bodies placed by common joint centres" in done.stderr
+    assert done.code == 0
+    assert "sub-01: given.osim, map rajagopal: bodies placed by common joint centres" in done.err
     text = (results.out / "sub-01" / "export" / "sub-01_OM.osim").read_text(encoding="utf-8")
     assert ET.fromstring(text).find("Model").get("name") == "given"
     total = sum(inertia.mass for inertia in inertias_in(text).values())
@@ -213,9 +207,9 @@ def test_usage(results, tmp_path, arguments, said):
     odd.write_text('<OpenSimDocument Version="40000"><Model name="odd"/></OpenSimDocument>')
     places = {"table": results.study / "participants.tsv", "odd": odd}
     done = results.call(*(word.format(**places) for word in arguments))
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
+    assert done.code == 2
+    assert said in done.err
+    assert "Traceback" not in done.err
     assert results.files() == set()
 
 
@@ -225,8 +219,8 @@ def test_usage(results, tmp_path, arguments, said):
 def test_without_results_the_stage_to_run_is_named(results):
     results.artifact("bsip").unlink()
     done = results.call()
-    assert done.returncode == 2
-    assert "sub-01: export has no bsip to read; run `bsip identify` first" in done.stderr
+    assert done.code == 2
+    assert "sub-01: export has no bsip to read; run `bsip identify` first" in done.err
     assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
 
 
@@ -236,16 +230,16 @@ def test_refused_participant_is_left_out(results):
     row = pd.DataFrame([{"stage": "scale", "kind": "bad data", "sentence": "no markers."}])
     write_artifact(results.artifact("refusal-scale"), "refusal", row, NOTES)
     done = results.call()
-    assert done.returncode == 3
-    assert "sub-01: left out of export, since its input was refused" in done.stderr
+    assert done.code == 3
+    assert "sub-01: left out of export, since its input was refused" in done.err
     assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
 
 
 def test_damaged_table_is_refused_and_the_others_done(results):
     results.artifact("bsip").write_bytes(b"nothing")
     done = results.call()
-    assert done.returncode == 3
-    assert f"{results.artifact('bsip')}: is not an artifact of bsip" in done.stderr
+    assert done.code == 3
+    assert f"{results.artifact('bsip')}: is not an artifact of bsip" in done.err
     assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
 
 
@@ -254,27 +248,27 @@ def test_values_that_are_no_numbers_are_refused(results):
     values[3, 0] = np.nan
     results.write_inertias({"OM": values})
     done = results.call("--participant", "sub-01")
-    assert done.returncode == 3
-    assert "OM holds values that are no numbers" in done.stderr
+    assert done.code == 3
+    assert "OM holds values that are no numbers" in done.err
     assert results.files() == set()
 
 
 def test_impossible_inertia_goes_into_the_table_only(results):
     """And takes away the model of an earlier identification under the same name."""
-    assert results.call("--participant", "sub-01").returncode == 0
+    assert results.call("--participant", "sub-01").code == 0
     results.write_inertias({"OM": impossible(readable(identified_person()), 2)})
     done = results.call("--participant", "sub-01")
-    assert done.returncode == 3
-    assert done.stderr.count("OM has an inertia that no body can have at head") == 1
+    assert done.code == 3
+    assert done.err.count("OM has an inertia that no body can have at head") == 1
     assert results.files() == {"sub-01/export/sub-01_OM.csv"}
 
 
 def test_repaired_inertia_is_told_in_the_file(results):
     results.write_inertias({"OM": impossible(readable(identified_person()), 2)})
     done = results.call("--participant", "sub-01", "--repair")
-    assert done.returncode == 0
+    assert done.code == 0
     said = "head: impossible tensor replaced by the nearest, "
-    assert f"export: sub-01: {said}" in done.stderr
+    assert f"export: sub-01: {said}" in done.err
     for name in results.files():
         assert said in (results.out / name).read_text(encoding="utf-8")
 
@@ -284,8 +278,8 @@ def test_no_file_outside_of_the_folder(results):
     values = readable(identified_person())
     results.write_inertias({"RM": values, "../../../evil": values})
     done = results.call("--participant", "sub-01", "--method", "../../../evil")
-    assert done.returncode == 2
-    assert "has no method ../../../evil; expected one of RM" in done.stderr
+    assert done.code == 2
+    assert "has no method ../../../evil; expected one of RM" in done.err
     assert results.files() == set()
     assert not list(results.out.parent.rglob("*evil*"))
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+
+from tests.program import Answer, Program
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 
@@ -109,18 +109,16 @@ def laid_out(root: Path, lab: Lab) -> Path:
     return study
 
 
-def stage(name: str, study: Path) -> subprocess.CompletedProcess:
-    out = study.with_name("out")
-    command = [sys.executable, "-m", "bsip_cli", name, str(study), "--out", str(out)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def stage(name: str, study: Path) -> Answer:
+    return Program()(name, study, "--out", study.with_name("out"))
 
 
 @pytest.mark.parametrize("lab", LABS.values(), ids=LABS.keys())
 def test_from_the_recording_to_poses(tmp_path, lab):
     study = laid_out(tmp_path, lab)
     answers = [stage(name, study) for name in ("ingest", "scale", "ik")]
-    told = "\n".join(answer.stderr for answer in answers)
-    assert [answer.returncode for answer in answers] == [0, 0, 0], told
+    told = "\n".join(answer.err for answer in answers)
+    assert [answer.code for answer in answers] == [0, 0, 0], told
     for words in lab.said:
         assert words in told
     out = tmp_path / "out" / "sub-01"
@@ -137,6 +135,6 @@ def test_legs_only_are_refused_unasked(tmp_path):
     study = laid_out(tmp_path, Lab("ktk_walk_and_serve/walk.c3d", "plugin_gait", 0))
     stage("ingest", study)
     answer = stage("scale", study)
-    assert answer.returncode == 3
-    assert "no markers on the upper torso" in answer.stderr
-    assert '"hand", "upper_torso"]' in answer.stderr
+    assert answer.code == 3
+    assert "no markers on the upper torso" in answer.err
+    assert '"hand", "upper_torso"]' in answer.err

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from tests.program import Program
 from tests.real.test_real_studies import DATA, make_study
 
 pytestmark = [
@@ -21,11 +20,7 @@ pytestmark = [
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose")
 
 
-def bsip(*arguments: str | Path) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done
+bsip = Program().done
 
 
 def diagnosis_of(study: Path, out: Path) -> pd.DataFrame:

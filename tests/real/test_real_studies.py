@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.program import Answer, Program
 from tests.real.figaroh_csv import convert
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -24,9 +23,8 @@ pytestmark = [
 ]
 
 
-def run(study: Path, out: Path) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "bsip_cli", "run", str(study), "--out", str(out)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def run(study: Path, out: Path) -> Answer:
+    return Program().done("run", study, "--out", out)
 
 
 def make_study(folder: Path, rows: list[str], options: str, files: dict[str, str]) -> Path:
@@ -82,10 +80,10 @@ def opencap(tmp_path_factory):
 
 def test_opencap_runs_and_says_what_it_met(opencap):
     done, out = opencap
-    assert done.returncode == 0, done.stderr
-    assert "the plates measure 60.18 kg (to 1.1 %)" in done.stderr
-    assert "stated are 62.60 kg (-3.9 %, tolerance 2 %)" in done.stderr
-    assert "no markers on the head" in done.stderr
+    assert done.code == 0, done.err
+    assert "the plates measure 60.18 kg (to 1.1 %)" in done.err
+    assert "stated are 62.60 kg (-3.9 %, tolerance 2 %)" in done.err
+    assert "no markers on the head" in done.err
     assert (out / "sub-01" / "report.html").exists()
     assert (out / "group" / "tables" / "table2_cop_rmse.csv").exists()
 
@@ -131,8 +129,8 @@ def figaroh(tmp_path_factory):
 
 def test_figaroh_runs_without_static_trial_mass_or_height(figaroh):
     done, out = figaroh
-    assert done.returncode == 0, done.stderr
-    assert "no static trial" in done.stderr
+    assert done.code == 0, done.err
+    assert "no static trial" in done.err
     person = pd.read_parquet(out / "sub-01" / "sub-01_person.parquet").iloc[0]
     assert person["mass_source"] == "plates"
     assert abs(person["mass_kg"] - 94.4) < 0.5
@@ -161,8 +159,7 @@ def test_biobuddy_runs_and_the_four_kilograms_show(tmp_path):
         "sub-01_task-rightknee.c3d": "biobuddy_ech/right_knee.c3d",
     }
     study = make_study(tmp_path / "study", ["sub-01\tM\tn/a\tn/a"], "", files)
-    done = run(study, tmp_path / "out")
-    assert done.returncode == 0, done.stderr
+    run(study, tmp_path / "out")
     person = pd.read_parquet(tmp_path / "out" / "sub-01" / "sub-01_person.parquet").iloc[0]
     assert abs(person["plate_mass_kg"] - 66.0) < 0.1
     # The one-leg trials read 62 kg, since a hand holds on: they do not identify.
@@ -182,8 +179,7 @@ def test_plugin_gait_statics_of_two_people(tmp_path):
     }
     rows = ["sub-01\tF\t47.5\t1.505", "sub-02\tM\t66.5\t1.79"]
     study = make_study(tmp_path / "study", rows, "", files)
-    done = run(study, tmp_path / "out")
-    assert done.returncode == 0, done.stderr
+    run(study, tmp_path / "out")
     for name, kg in (("sub-01", 46.3), ("sub-02", 64.0)):
         person = pd.read_parquet(tmp_path / "out" / name / f"{name}_person.parquet").iloc[0]
         assert abs(person["plate_mass_kg"] - kg) < 0.1

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+
+from tests.program import Program
 
 pytestmark = pytest.mark.long
 
@@ -20,9 +20,7 @@ COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 @pytest.fixture(scope="module")
 def out(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("sample") / "out"
-    command = [sys.executable, "-m", "bsip_cli", "run", str(SAMPLE), "--out", str(folder)]
-    done = subprocess.run([*command, "--jobs", "2"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    Program().done("run", SAMPLE, "--out", folder, "--jobs", 2)
     return folder
 
 

@@ -210,7 +210,7 @@ def test_unmeasured_feet_stand_beside_the_plate(trial, person, task):
     for side in "lr":
         ankle = here.poses.origin_m[f"foot_{side}"][:, 0] - centre[0]
         length = person.lengths_m[f"foot_{side}"]
-        loaded = here.feet_force_n[side][:, 1] > 1.0
+        loaded = here.feet[side][0][:, 1] > 1.0
         off, on = loaded & ~here.on_plate[side], loaded & here.on_plate[side]
         heel, toe = ankle - 0.27 * length, ankle + 0.73 * length
         assert np.all((heel[off] > half) | (toe[off] < -half))

@@ -9,7 +9,7 @@ import pytest
 
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person, draw_person
-from bsip_cli.simulate.recording import marker_paths, rigid_paths, simulate_trial
+from bsip_cli.simulate.recording import Trial, marker_paths, rigid_paths, simulate_trial
 from bsip_cli.simulate.study import wobbling
 
 LIGHT = replace(Richness(), marker_noise_m=0.0, marker_drift_m=0.0, gaps=False)
@@ -58,16 +58,13 @@ def test_only_its_own_markers_and_mass_tell_the_two_apart():
 
 def test_what_swings_keeps_the_weight_and_changes_the_landing():
     person = person_with(MEASURED)
-    stiff, loose = (
-        simulate_trial(person, task, np.random.default_rng(5), length, effects=effects)
-        for task, length, effects in (
-            ("walking", 1.2, ()),
-            ("walking", 1.2, wobbling(person)),
-        )
-    )
+
+    def simulated(task: str, length_s: float, effects=()) -> Trial:
+        return simulate_trial(person, task, np.random.default_rng(5), length_s, effects=effects)
+
+    swinging = wobbling(person)
+    stiff, loose = simulated("walking", 1.2), simulated("walking", 1.2, swinging)
     change = loose.force_n[:, 1] - stiff.force_n[:, 1]
     assert np.sqrt(np.mean(change**2)) > 3.0
-    quiet = simulate_trial(
-        person, "static", np.random.default_rng(5), 1.0, effects=wobbling(person)
-    )
+    quiet = simulated("static", 1.0, swinging)
     assert quiet.force_n[:, 1].mean() == pytest.approx(9.81 * person.mass_kg, rel=1e-3)

@@ -108,8 +108,7 @@ def test_cop_stays_within_the_feet(trial, task):
 @pytest.mark.parametrize("task", ["steps", "walking", "running"])
 def test_each_foot_carries_its_load_under_itself(trial, task):
     here = trial(task)
-    total = sum(here.feet_force_n.values())
-    moments = sum(here.feet_moment_nm.values())
+    total, moments = (sum(parts) for parts in zip(*here.feet.values(), strict=True))
     air = np.zeros(len(here.plan), dtype=bool)
     for first, last in here.plan.flights:
         air[first : last + 1] = True
@@ -117,7 +116,7 @@ def test_each_foot_carries_its_load_under_itself(trial, task):
     assert np.abs(total - here.force_n)[ground].max() < 1e-6
     assert np.abs(moments - here.moment_nm)[ground].max() < 1e-6
     for side in "lr":
-        force, moment = here.feet_force_n[side], here.feet_moment_nm[side]
+        force, moment = here.feet[side]
         loaded = force[:, 1] > 30.0
         cop = centre_of_pressure(force[loaded], moment[loaded])
         ankle = here.poses.origin_m[f"foot_{side}"][loaded][:, [0, 2]]

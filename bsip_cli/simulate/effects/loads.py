@@ -25,7 +25,7 @@ from bsip_cli.simulate.effects.base import (
     uniform,
     with_body,
 )
-from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
+from bsip_cli.simulate.numerics import rotate, second_derivative, step, swung, window
 from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import GRAVITY, Ball, G, Load, Plan, Poses
 
@@ -197,10 +197,7 @@ class WobblingMass(OnSegment, name="wobbling_mass"):
 
 @dataclass(frozen=True, eq=False)
 class Swinging(Load):
-    """A point mass on a spring and a damper at a point of a body.
-
-    Its displacement u against that point r obeys u'' + 2 z w u' + w^2 u = -r''.
-    """
+    """A point mass on a spring and a damper at a point of a body."""
 
     mass_kg: float
     frequency_hz: float
@@ -209,11 +206,8 @@ class Swinging(Load):
     def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
         """The force of spring and damper, which bears the mass' weight too."""
         r = poses.point(self.body, self.position_m)
-        acceleration = second_derivative(r, step_s)
-        w, z = 2.0 * np.pi * self.frequency_hz, self.damping_ratio
-        denominator = [1.0, 2.0 * z * w, w * w]
-        travel = response([-1.0], denominator, acceleration, step_s)
-        own = response([2.0 * z * w, w * w], denominator, acceleration, step_s)
+        of_the_point = second_derivative(r, step_s)
+        travel, own = swung(self.frequency_hz, self.damping_ratio, of_the_point, step_s)
         force = self.mass_kg * (own - GRAVITY)
         return force, np.cross(r + travel, force)
 

@@ -283,7 +283,8 @@ def _events(fit: MarkerFit, found: list[_Slip], least: int) -> list[MarkerEvent]
         sums = ((k, one.m, slip.vector + one.vector) for k, one in enumerate(waiting))
         if back := [k for k, m, sum_ in sums if m == slip.m and np.linalg.norm(sum_) < 0.5 * size]:
             frames = slice(slip.frame, waiting.pop(back[0]).frame)
-            events.append(event(fit, "jump", slip.m, frames, size, slip.z))
+            if frames.start < frames.stop:  # else nothing has happened
+                events.append(event(fit, "jump", slip.m, frames, size, slip.z))
             continue
         for k, one in enumerate(slips):
             if one.m == slip.m and slip.frame - one.frame < least:

@@ -300,7 +300,7 @@ def agreeing_mass(
 SIDES = ("l", "r")
 _NOBODY, _LEFT, _RIGHT, _SHARED, _UNCLEAR = -1, 0, 1, 2, 3
 _NEARER = 0.5  # of the other foot's distance: so near a centre of pressure is under one foot alone
-_AGREE = 0.95  # of a contact's frames, where the centre of pressure alone shows the foot
+_AGREE = 0.95  # of a contact's impulse, where the centre of pressure alone shows the foot
 _AROUND_S = 0.05  # about a load: what the plate reads below the threshold is still the foot's
 
 
@@ -422,10 +422,11 @@ def _by_load(
     owner = np.where(clear, gaps.argmin(axis=0), _UNCLEAR)
     for start, stop in runs(asked):
         frames = np.arange(start, stop)[both[start:stop]]
-        if len(frames):
-            kinds, counts = np.unique(owner[frames], return_counts=True)
-            is_one = counts.max() >= _AGREE * len(frames)
-            owner[frames] = kinds[counts.argmax()] if is_one else _UNCLEAR
+        if len(frames):  # who hardly loads it, as before a chair is left, hardly shows where
+            kinds, which = np.unique(owner[frames], return_inverse=True)
+            loads = np.bincount(which, weights=plate.lift_N[frames])
+            is_one = loads.max() >= _AGREE * loads.sum()
+            owner[frames] = kinds[loads.argmax()] if is_one else _UNCLEAR
     return owner
 
 

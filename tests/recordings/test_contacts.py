@@ -311,6 +311,16 @@ def test_weight_that_shifts_over_a_plate_without_outline_is_no_foots():
     assert np.isnan(found.wrench["l"]).all() and np.isnan(found.wrench["r"]).all()
 
 
+def test_who_hardly_loads_a_plate_does_not_show_under_which_foot():
+    """A third of a contact with 25 N between the feet, as of one who sits, the rest under the left
+    foot."""
+    course = steady_load(LEFT, 400.0)
+    course[: N // 3] = steady_load((LEFT + RIGHT) / 2, 25.0)[: N // 3]
+    found = told([_read_as(course, None), _read_as(steady_load(RIGHT, 400.0), None)])
+    np.testing.assert_allclose(found.wrench["l"], course)
+    assert np.isfinite(found.wrench["r"]).all()
+
+
 def test_a_foot_in_the_air_bears_nothing_and_one_beside_is_unknown():
     air = {"l": YES, "r": ~YES}
     plate = _read_as(steady_load(LEFT, 700.0), OUTLINE + ASIDE)

@@ -118,11 +118,11 @@ def contact_windows(
     """Frames in which the plates measure all that touches the person.
 
     ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
-    None, no frame can be shown to be free of other contacts, and none is valid. ``body_reach_m_s2``
-    (n_frames,) : what the vertical force has to be over the mass, by all segments: it shows when
-    something begins to bear that bears a third of the weight later. ``stands_kg`` is
+    None, no frame can be shown to be free of other contacts, and none is valid. ``stands_kg`` is
     what the plates read of the person standing still: where that is less, the forces or the mass
-    are wrong alike in all frames, and nothing else bears the person.
+    are wrong alike in all frames, and nothing else bears the person. ``body_reach_m_s2``
+    (n_frames,) is what the vertical force has to be over the mass, by all segments: with it, what
+    bears the person is left out from its first touch to its last.
     """
     reasons = feet.reasons
     if not feet.usable.any() or mass_kg is None:

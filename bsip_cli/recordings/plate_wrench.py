@@ -168,18 +168,21 @@ def nobody_near(recording: Recording, plate: Plate) -> np.ndarray:
 def foot_rests(recording: Recording, plate: Plate) -> np.ndarray:
     """Samples at which the plate is pressed where a foot stands whose markers are all on the
     ground, (n_analog,) bool: an offset would have its centre of pressure anywhere."""
-    n, last = len(plate.usable), len(recording.markers_m) - 1
-    frames, rests = _frame_of_sample(recording, n), np.zeros(n, bool)
-    if not recording.labels or last < 0:
-        return rests
+    n, n_frames = len(plate.usable), len(recording.markers_m)
+    if not recording.labels or not n or not n_frames:
+        return np.zeros(n, bool)
+    ratio = recording.analog_rate_hz / recording.marker_rate_hz
+    at = np.minimum(np.rint(np.arange(n_frames) * ratio).astype(int), n - 1)  # of each frame
     surface_m = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
-    known = recording.labels, recording.markers_m, np.minimum(frames, last), [surface_m]
-    feet, cop_m = Feet.of(*known), plate.cop_m()
+    feet = Feet.of(recording.labels, recording.markers_m, np.arange(n_frames), [surface_m])
+    cop_m, rests = plate.cop_m()[at], np.zeros(n_frames, bool)
     for side in set(feet.sides):
         mine = feet.of_side(side)
-        on = mine.distance_m(cop_m, np.zeros(n, bool)) < BESIDE_M
+        on = mine.distance_m(cop_m, np.zeros(n_frames, bool)) < BESIDE_M
         rests |= on & np.all(np.isfinite(mine.points_m), axis=(1, 2))
-    return rests & (frames <= last) & (plate.lift_N > _QUIET_N)  # by less nothing is pressed
+    rests &= plate.lift_N[at] > _QUIET_N  # by less nothing is pressed
+    frames = _frame_of_sample(recording, n)
+    return rests[np.minimum(frames, n_frames - 1)] & (frames < n_frames)
 
 
 def _frame_of_sample(recording: Recording, n: int) -> np.ndarray:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bsip_cli.errors import BadDataError, ChangedError, not_writable
+from bsip_cli.errors import BadDataError, ChangedError, UsageError, not_writable
 from bsip_cli.files.fingerprints import BLANK, SEAL, file_hash, fingerprint, forget, seal
 from bsip_cli.schemas import SCHEMAS, Schema, column_names
 
@@ -28,7 +30,7 @@ _SHAPE = {
     "provenance": {"made_by": _MADE_BY, "messages": [str], "facts": dict},
 }
 
-_UNFINISHED, _NOTES = ".bsip-part", ("unit", "frame", "meaning")
+_LOCK, _UNFINISHED, _NOTES = ".lock", ".bsip-part", ("unit", "frame", "meaning")
 
 Rows = pd.DataFrame | Sequence[Mapping[str, Any]]
 Provenance = Mapping[str, Any]
@@ -313,3 +315,34 @@ def _plain(series: pd.Series) -> Any:
     if isinstance(series.dtype, pd.CategoricalDtype):
         return pa.array(series).cast(pa.string())
     return np.asarray(series, dtype=object)
+
+
+# --- only one program at a time writes into a folder of results -------------------------------
+
+
+@contextmanager
+def held_alone(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock; the system lets go of it whatever becomes of the process.
+
+    What killed processes left half written there is taken away.
+
+    UsageError: another process holds it, or the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = (folder / _LOCK).open("a")
+    except OSError as error:
+        raise not_writable(folder, error) from None
+    with handle:
+        try:
+            fcntl.flock(handle.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise UsageError(
+                "another bsip is writing there",
+                file=folder,
+                remedy="wait until it has ended, and run again",
+            ) from None
+        except OSError as error:
+            raise not_writable(folder, error) from None
+        remove_unfinished(folder)
+        yield

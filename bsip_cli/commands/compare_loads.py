@@ -12,7 +12,7 @@ import click
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import remove
+from bsip_cli.artifacts import held_alone, remove
 from bsip_cli.body.inertia import PARAMETERS, UNITS, from_phi, readable_jacobian
 from bsip_cli.body.person import Person
 from bsip_cli.errors import BadDataError, BsipError, UsageError, printable
@@ -22,7 +22,7 @@ from bsip_cli.identification.problem import Problem
 from bsip_cli.pipeline import READERS
 from bsip_cli.report.tables.model import TEXTS, Column, Row, Table, to_markdown
 from bsip_cli.report.words import listing, number, segment_label
-from bsip_cli.running.runner import attempt, held_alone
+from bsip_cli.running.runner import attempt
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names

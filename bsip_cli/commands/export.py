@@ -15,7 +15,7 @@ import pandas as pd
 from scipy.ndimage import binary_erosion
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import is_made_from, remove, write_bytes
+from bsip_cli.artifacts import held_alone, is_made_from, remove, write_bytes
 from bsip_cli.body.exports import FORMATS, bids_motion, osim
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
@@ -30,7 +30,7 @@ from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import SIDES
 from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.words import TEXTS
-from bsip_cli.running.runner import Outcome, attempt, held_alone, lacking
+from bsip_cli.running.runner import Outcome, attempt, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import signal
 import time
 import traceback
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -17,10 +16,10 @@ import pandas as pd
 
 from bsip_cli import errors
 from bsip_cli.artifacts import (
+    held_alone,
     read_artifact,
     read_header,
     remove,
-    remove_unfinished,
     write_artifact,
     write_bytes,
 )
@@ -33,7 +32,6 @@ from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study
 from bsip_cli.study.trials import listed
 
-LOCK = ".lock"
 _MOVED = "what all persons together show has moved"
 _SHORT_OF_MEMORY = "the process was killed (out of memory?); run again, with fewer --jobs"
 
@@ -477,34 +475,3 @@ def outdated(path: Path) -> str:
             seen.add(source.name)
             waiting.append(source)
     return ""
-
-
-# --- only one program at a time writes into a folder of results -------------------------------
-
-
-@contextmanager
-def held_alone(folder: Path) -> Iterator[None]:
-    """Hold a folder's lock; the system lets go of it whatever becomes of the process.
-
-    What killed processes left half written there is taken away.
-
-    UsageError: another process holds it, or the folder cannot be written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle = (folder / LOCK).open("a")
-    except OSError as error:
-        raise errors.not_writable(folder, error) from None
-    with handle:
-        try:
-            fcntl.flock(handle.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise errors.UsageError(
-                "another bsip is writing there",
-                file=folder,
-                remedy="wait until it has ended, and run again",
-            ) from None
-        except OSError as error:
-            raise errors.not_writable(folder, error) from None
-        remove_unfinished(folder)
-        yield

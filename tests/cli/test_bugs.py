@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.artifacts import read_header
+from bsip_cli.artifacts import held_alone, read_header
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import Stage
 from bsip_cli.running import session
 from bsip_cli.running.processes import EndedError
-from bsip_cli.running.runner import held_alone, run_stages
+from bsip_cli.running.runner import run_stages
 from bsip_cli.study.study import load_study
 
 STAGES = {

@@ -17,11 +17,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli import __version__, library
-from bsip_cli.artifacts import read_header, write_artifact
+from bsip_cli.artifacts import held_alone, read_header, write_artifact
 from bsip_cli.config import load_config
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.running.runner import held_alone, perform, why_stale
+from bsip_cli.running.runner import perform, why_stale
 from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnosed_trials import prior_of, weighed

@@ -114,6 +114,19 @@ class MarkerFit:
         _, m, vector = min(fits, key=lambda one: one[0])
         return m, vector, np.einsum("jak,k->ja", self.response[:, :, m], vector)
 
+    def lengthened_m(self, m: int, vector: np.ndarray) -> dict[int, float]:
+        """By how much marker ``m``, displaced by ``vector`` (3,) on its segment, gets farther from
+        each other marker of it [m]: no pose can change these distances."""
+        places, segments = self.person.marker_positions_m, self.person.marker_segments
+        others = [j for j in np.flatnonzero(segments == segments[m]).tolist() if j != m]
+        apart = places[m] - places[others]
+        longer = np.linalg.norm(apart + vector, axis=1) - np.linalg.norm(apart, axis=1)
+        return dict(zip(others, longer.tolist(), strict=True))
+
+    def apart_m(self, m: int, other: int) -> np.ndarray:
+        """(N,) measured distance of two markers, NaN where one is missing."""
+        return np.linalg.norm(self.measured_m[:, m] - self.measured_m[:, other], axis=1)
+
     def distance_m(self) -> np.ndarray:
         """(N, m) distance of each marker from its model, NaN where missing."""
         return np.linalg.norm(self.residual_m, axis=2)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import chdtri, fdtrc
 
-from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit
+from bsip_cli.motion.marker_fit import BEYOND, MEDIAN_LENGTH, MarkerFit, Uncertain
 from bsip_cli.segments import in_words
 
 # --- one change of level in an autocorrelated signal that also follows known columns --------------
@@ -170,9 +170,9 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
 
     The median residual of a marker must exceed ``_OFFSET`` times what it is trusted to and its
     spread, and stand out from the median residuals of the others. Marker after marker is named
-    whose displacement explains most of all markers' median residuals. One that was in its place
-    first has slipped: where the pose follows a slip, joint angles seem to explain it, and the
-    search for slips is blind to it.
+    whose displacement explains most of all markers' median residuals, but for one whose distances
+    to its neighbours stay. One that was in its place first has slipped: where the pose follows a
+    slip, joint angles seem to explain it, and the search for slips is blind to it.
     """
     seen = np.isfinite(residual[..., 0])
     enough = seen.sum(axis=0) >= max(3, _LEAST_SHARE * len(residual))
@@ -188,16 +188,21 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
     # Where two markers make a segment's pose, it takes up most of an offset.
     least = BEYOND * fit.trusted_m
     least = np.minimum(least, np.maximum(0.5 * least, _STANDS_OUT * usual))
-    events: list[MarkerEvent] = []
+    events, elsewhere = list[MarkerEvent](), set[int]()
     for _ in range(len(mean)):
-        shown = np.linalg.norm(mean, axis=1)
-        candidates = [int(m) for m in np.flatnonzero(enough) if shown[m] > least[m]]
+        large = np.flatnonzero(enough & (np.linalg.norm(mean, axis=1) > least)).tolist()
+        candidates = [m for m in large if m not in elsewhere]
         if not candidates:
             break
         m, vector, made = fit.source_of(mean, sd, candidates)
         size = float(np.linalg.norm(vector))
         if size < limit[m]:
             break
+        longer = _longer_m(fit, m)
+        stays = max((abs(x) for x, _ in longer.values()), default=0.0) < BEYOND * fit.trusted_m[m]
+        if stays and not fit.is_shown(m, vector, longer):
+            elsewhere.add(m)
+            continue
         start = _leaves_its_place(residual[:, m], mean[m], round(_STAYS_S / fit.step_s()))
         kind: Kind = "slip" if start else "offset"
         frames, surely = slice(start, len(residual)), float(_OFFSET * size / limit[m])
@@ -208,12 +213,21 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
     return events
 
 
+def _longer_m(fit: MarkerFit, m: int) -> dict[int, Uncertain]:
+    """By how much the distance to each neighbour is longer than where both were calibrated."""
+    places, found = fit.person.marker_positions_m, {}
+    for other in fit.neighbours(m):
+        if np.isfinite(apart := fit.apart_m(m, other)).any():
+            calibrated = np.linalg.norm(places[m] - places[other])
+            found[other] = float(np.nanmedian(apart) - calibrated), float(fit.trusted_m[m])
+    return found
+
+
 def _remarks(fit: MarkerFit, m: int, size_m: float, share: float) -> str:
     """Where a marker is seen in a part of the frames only, and where it is farther from its place
     than the segment's next marker is, which skin does not do."""
-    segments, places = fit.person.marker_segments, fit.person.marker_positions_m
-    others = np.flatnonzero((segments == segments[m]) & (np.arange(len(segments)) != m))
-    apart_m = np.linalg.norm(places[others] - places[m], axis=1)
+    places = fit.person.marker_positions_m
+    apart_m = np.linalg.norm(places[fit.neighbours(m)] - places[m], axis=1)
     note = f" (seen in {100 * share:.0f} % of it)" if share < _OFTEN else ""
     is_far = size_m > apart_m.min(initial=np.inf)
     return note + ("; probably another marker, as the next one is nearer" if is_far else "")
@@ -235,8 +249,6 @@ def _leaves_its_place(residual: np.ndarray, level: np.ndarray, least: int) -> in
 Kind = Literal["jump", "slip", "swap", "offset"]
 
 _ORDER: tuple[Kind, ...] = ("swap", "offset", "slip", "jump")
-# Nothing is reported that stays within this many times what a marker is trusted to.
-BEYOND = 1.5
 _BEAR = "bear each other's labels"
 _DONE = {True: "corrected", False: "not clear enough to correct, left as recorded"}
 

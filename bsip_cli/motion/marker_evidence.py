@@ -33,7 +33,6 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from bsip_cli.motion.marker_events import (
-    BEYOND,
     LevelChange,
     MarkerEvent,
     event,
@@ -43,7 +42,7 @@ from bsip_cli.motion.marker_events import (
     two_levels,
 )
 from bsip_cli.motion.marker_exchange import Labelling, Refit, exchanged, relabelled
-from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit
+from bsip_cli.motion.marker_fit import BEYOND, MEDIAN_LENGTH, MarkerFit
 
 # --- markers that leave their place for a moment: ghosts, flickers, badly filled gaps -------------
 
@@ -167,7 +166,6 @@ _SKIN_M_PER_RAD = 0.03
 _SAME_SHARE = 0.7  # a change that is explained to 30 % by a slip at the same time is no second one
 _LEAST_RESPONSE = 0.003  # what follows a slip by less says nothing of it
 _MOST = 12
-_SHOWN = 0.5  # of a slip, at least, by the distances to the segment's other markers
 
 
 class _Slip(NamedTuple):
@@ -175,7 +173,6 @@ class _Slip(NamedTuple):
     frame: int
     vector: np.ndarray
     z: float
-    is_shown: bool = True
 
 
 class _Search:
@@ -218,8 +215,7 @@ class _Search:
         return replace(found, at=int(seen[found.at])) if found else None
 
     def source(self, first: int, changes: dict[int, LevelChange]) -> tuple[_Slip, np.ndarray]:
-        """Whose slip makes the strongest change, and the change it makes of all (m, 3): of those
-        whose distances to their neighbours agree, where there are such."""
+        """Whose slip makes the strongest change, and the change it makes of all (m, 3)."""
         fit, strongest = self.fit, changes[first]
         field, sd = np.full((len(fit.labels), 3), np.nan), np.full(len(fit.labels), np.nan)
         near = {m: f for m, f in changes.items() if abs(f.at - strongest.at) <= self.least}
@@ -231,18 +227,12 @@ class _Search:
         near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first: strongest}
         field[first], sd[first] = strongest.step, strongest.step_sd
         sd = np.hypot(sd, 0.1 * np.linalg.norm(strongest.step))
-        candidates, possible = list(near), list[tuple[_Slip, np.ndarray]]()
-        while candidates and not (possible and possible[-1][0].is_shown):
-            m, vector, made = fit.source_of(field, sd, candidates)
-            slip = _Slip(m, self._frame(m, near[m]), vector, near[m].z)
-            shown = self._is_shown_by_distances(slip)
-            possible.append((slip._replace(is_shown=shown), made))
-            candidates.remove(m)
-        slip, made = possible[-1 if possible[-1][0].is_shown else 0]
+        m, vector, made = fit.source_of(field, sd, list(near))
+        frame = self._frame(m, near[m])
         left = np.linalg.norm(field - made, axis=1)
         same = left < _SAME_SHARE * np.linalg.norm(field, axis=1)
-        same[slip.m] = True
-        return slip, np.where(same[:, None], field, made)
+        same[m] = True
+        return _Slip(m, frame, vector, near[m].z), np.where(same[:, None], field, made)
 
     def take(self, slip: _Slip, made: np.ndarray) -> None:
         """Take a slip out of the residuals."""
@@ -251,23 +241,17 @@ class _Search:
         moved = np.linalg.norm(made, axis=1) > 0.1 * self.fit.trusted_m
         self.best = {k: f for k, f in self.best.items() if not moved[k]}
 
-    def _is_shown_by_distances(self, slip: _Slip) -> bool:
-        """Whether the distances to the segment's other markers change as the slip says; where it
-        would change none by more than skin does, they say nothing."""
-        longer = self.fit.lengthened_m(slip.m, slip.vector)
-        made, seen = [], []
-        columns = self.columns[self.fit.person.marker_segments[slip.m]]
-        for other, by in longer.items():
+    def is_shown_by_distances(self, slip: _Slip) -> bool:
+        """Whether the distances to the segment's other markers change as the slip says."""
+        columns, longer = self.columns[self.fit.person.marker_segments[slip.m]], {}
+        for other in self.fit.neighbours(slip.m):
             apart = block_means(self.fit.apart_m(slip.m, other)[:, None], self.frames)
-            known = np.isfinite(apart[:, 0])
-            at = int(known[: slip.frame // self.frames].sum())
-            found = find_level_change(apart[known], columns[known], _SKIN_M_PER_RAD, 1, at)
+            seen = np.isfinite(apart[:, 0])
+            at = int(seen[: slip.frame // self.frames].sum())
+            found = find_level_change(apart[seen], columns[seen], _SKIN_M_PER_RAD, 1, at)
             if found:
-                made.append(by)
-                seen.append(float(found.step[0]))
-        if np.max(np.abs(made), initial=0.0) < self.fit.trusted_m[slip.m]:
-            return True
-        return bool(np.dot(seen, made) > _SHOWN * np.dot(made, made))
+                longer[other] = float(found.step[0]), found.step_sd
+        return self.fit.is_shown(slip.m, slip.vector, longer)
 
     def _frame(self, m: int, found: LevelChange) -> int:
         """First frame at the new level: the split near the block with the least squares."""
@@ -296,7 +280,7 @@ def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.n
         slip, made = search.source(max(changes, key=lambda m: changes[m].z), changes)
         search.take(slip, made)
         is_large = np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]
-        if is_large and slip.is_shown:
+        if is_large and search.is_shown_by_distances(slip):
             found.append(slip)
     return _events(fit, found, search.frames), search.left
 

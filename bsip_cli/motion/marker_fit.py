@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,11 +11,18 @@ import numpy as np
 from bsip_cli.body.person import Person
 from bsip_cli.motion.inverse_kinematics import marker_trust, normal_matrix, posed
 
+Uncertain = tuple[float, float]
+"""A number and its standard deviation."""
+
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
 # Median length of a three-dimensional normal vector of unit spread.
 MEDIAN_LENGTH = 1.538
 _LARGEST_M = 0.2  # a marker farther off says no more
+# Nothing is reported that stays within this many times what a marker is trusted to.
+BEYOND = 1.5
+_SHOWN = 0.5  # of a displacement, at least, by the distances to the segment's other markers
+_SURE = 2.0  # standard deviations
 _USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 
 
@@ -114,14 +122,22 @@ class MarkerFit:
         _, m, vector = min(fits, key=lambda one: one[0])
         return m, vector, np.einsum("jak,k->ja", self.response[:, :, m], vector)
 
-    def lengthened_m(self, m: int, vector: np.ndarray) -> dict[int, float]:
-        """By how much marker ``m``, displaced by ``vector`` (3,) on its segment, gets farther from
-        each other marker of it [m]: no pose can change these distances."""
-        places, segments = self.person.marker_positions_m, self.person.marker_segments
-        others = [j for j in np.flatnonzero(segments == segments[m]).tolist() if j != m]
+    def is_shown(self, m: int, vector: np.ndarray, longer_m: Mapping[int, Uncertain]) -> bool:
+        """Whether the distances to other markers of its segment, which no pose can change, are
+        longer, each known to a standard deviation, by what a displacement (3,) of marker ``m`` on
+        the segment would make them; where that would not show, it is believed."""
+        if not longer_m:
+            return True
+        places, others = self.person.marker_positions_m, list(longer_m)
+        seen, sd = np.array(list(longer_m.values())).T
         apart = places[m] - places[others]
-        longer = np.linalg.norm(apart + vector, axis=1) - np.linalg.norm(apart, axis=1)
-        return dict(zip(others, longer.tolist(), strict=True))
+        made = (np.linalg.norm(apart + vector, axis=1) - np.linalg.norm(apart, axis=1)) / sd
+        return bool(made @ (seen / sd) + _SURE * np.linalg.norm(made) > _SHOWN * made @ made)
+
+    def neighbours(self, m: int) -> list[int]:
+        """The other markers of its segment."""
+        segments = self.person.marker_segments
+        return [k for k in np.flatnonzero(segments == segments[m]).tolist() if k != m]
 
     def apart_m(self, m: int, other: int) -> np.ndarray:
         """(N,) measured distance of two markers, NaN where one is missing."""

@@ -13,6 +13,7 @@ from tests.marker_evidence.swinging_markers import (
     MARKERS,
     events_of,
     fitted,
+    markers_on,
     recording,
 )
 
@@ -79,12 +80,24 @@ def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
         changes=lambda: {0: SimpleNamespace(z=9.0)} if slips else {},
         source=lambda *_: (slips.pop(0), None),
         take=lambda *_: None,
+        is_shown_by_distances=lambda _: True,
     )
     monkeypatch.setattr(marker_evidence, "_Search", lambda *_: search)
     times_s, markers, _ = recording(2)
     events, _ = marker_evidence.slips(fitted(markers, times_s), np.zeros(0))
     assert [(one.kind, round(one.start_s, 1)) for one in events] == [("jump", 3.2), ("slip", 3.5)]
     assert events[1].size_m == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("segment", ["upper_arm_r", "thigh_l", "upper_torso", "lower_torso"])
+def test_a_segment_that_moves_in_its_joint_is_no_slip_of_its_markers(segment):
+    """Their distances to each other stay."""
+    times, clean, turns = recording(4)
+    markers = clean.copy()
+    for m in (MARKERS.index(label) for label in markers_on(segment)):
+        markers[START:, m] += turns[START:, m] @ (0.03, 0.02, 0.03)
+    slipped = {one.marker for one in events_of(times, markers) if one.kind == "slip"}
+    assert slipped.isdisjoint(markers_on(segment))
 
 
 def test_a_jump_in_a_filled_gap_says_so_and_a_filled_slip_is_none():

@@ -85,6 +85,7 @@ class Scale(Section):
     marker_sd_m: float = Field(gt=0)
     hinge_sd_rad: float = Field(gt=0)
     symmetry_sd: float = Field(gt=0)
+    mirror_sd_m: float = Field(gt=0)
     frames: Count
     independent_frames: float = Field(gt=0)
     iterations: int = Field(ge=0, le=_MANY)

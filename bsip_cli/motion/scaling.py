@@ -38,6 +38,7 @@ class ScalingOptions:
     marker_sd_m: float
     hinge_sd_rad: float
     symmetry_sd: float
+    mirror_sd_m: float
     independent_frames: float
     iterations: int
 
@@ -214,7 +215,25 @@ def _prior_precision(
             right = lengths[segments.index(f"{name[:-1]}r")]
             tie = (options.symmetry_sd * person.lengths_m[index]) ** -2
             precision[np.ix_([left, right], [left, right])] += tie * np.array([[1, -1], [-1, 1]])
+    tie = options.mirror_sd_m ** -2
+    for (kind, name, axis), k in _places(person, parameters).items():
+        sign = -1.0 if axis == 2 else 1.0
+        if name.endswith("_l") and kind != "shift":
+            other = _places(person, parameters)[kind, f"{name[:-1]}r", axis]
+            precision[np.ix_([k, other], [k, other])] += tie * np.array([[1, -sign], [-sign, 1]])
+        elif not name.endswith(("_l", "_r")) and axis == 2:
+            precision[k, k] += tie
     return precision
+
+
+def _places(person: Person, parameters: tuple[_Parameter, ...]) -> dict[tuple[str, str, int], int]:
+    """Numbers of the parameters that move a joint, an origin or a segment along an axis."""
+    segments = person.skeleton.segments
+    return {
+        (p.kind, segments[p.index], p.moves[0][1][1]): k
+        for k, p in enumerate(parameters)
+        if p.kind in ("joint", "origin", "shift")
+    }
 
 
 def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:

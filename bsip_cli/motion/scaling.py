@@ -25,6 +25,7 @@ from bsip_cli.motion.inverse_kinematics import (
 )
 from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
+from bsip_cli.segments import mirrored
 
 IkOptions = Mapping[str, Any]  # keyword options of :func:`solve_poses`
 
@@ -151,6 +152,7 @@ def _total_cost(
 
 _JOINT, _ORIGIN, _MARKER = "joint_in_parent_m", "origin_in_joint_m", "marker_positions_m"
 _TILTS = ("parent_tilt", "child_tilt")
+_SIDEWAYS = 2
 
 
 def _children(person: Person, segment: int) -> list[int]:
@@ -205,7 +207,8 @@ def _moving_joints(person: Person, segment: int) -> list[int]:
 def _prior_precision(
     person: Person, parameters: tuple[_Parameter, ...], options: ScalingOptions
 ) -> np.ndarray:
-    """(P, P) precision of the priors; left and right lengths pull each other."""
+    """(P, P) precision of the priors; left and right lengths and joints pull each other, and the
+    midline's joints and segments to its plane."""
     precision = np.diag([parameter.sd**-2 for parameter in parameters])
     lengths = {p.index: k for k, p in enumerate(parameters) if p.kind == "length"}
     segments = person.skeleton.segments
@@ -215,25 +218,19 @@ def _prior_precision(
             right = lengths[segments.index(f"{name[:-1]}r")]
             tie = (options.symmetry_sd * person.lengths_m[index]) ** -2
             precision[np.ix_([left, right], [left, right])] += tie * np.array([[1, -1], [-1, 1]])
-    tie = options.mirror_sd_m ** -2
-    for (kind, name, axis), k in _places(person, parameters).items():
-        sign = -1.0 if axis == 2 else 1.0
-        if name.endswith("_l") and kind != "shift":
-            other = _places(person, parameters)[kind, f"{name[:-1]}r", axis]
-            precision[np.ix_([k, other], [k, other])] += tie * np.array([[1, -sign], [-sign, 1]])
-        elif not name.endswith(("_l", "_r")) and axis == 2:
-            precision[k, k] += tie
-    return precision
-
-
-def _places(person: Person, parameters: tuple[_Parameter, ...]) -> dict[tuple[str, str, int], int]:
-    """Numbers of the parameters that move a joint, an origin or a segment along an axis."""
-    segments = person.skeleton.segments
-    return {
+    places = {
         (p.kind, segments[p.index], p.moves[0][1][1]): k
         for k, p in enumerate(parameters)
         if p.kind in ("joint", "origin", "shift")
     }
+    tie = options.mirror_sd_m**-2
+    for (kind, name, axis), k in places.items():
+        twin, sign = places.get((kind, mirrored(name), axis), k), -1.0 if axis == _SIDEWAYS else 1.0
+        if twin > k and kind != "shift":
+            precision[np.ix_([k, twin], [k, twin])] += tie * np.array([[1, -sign], [-sign, 1]])
+        elif twin == k and mirrored(name) == name and axis == _SIDEWAYS:
+            precision[k, k] += tie
+    return precision
 
 
 def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:

@@ -29,6 +29,7 @@ LOOSE = ScalingOptions(
     marker_sd_m=0.1,
     hinge_sd_rad=0.5,
     symmetry_sd=0.5,
+    mirror_sd_m=0.5,
     independent_frames=1000,
     iterations=25,
 )
@@ -199,6 +200,39 @@ def test_left_and_right_are_tied_softly():
     assert abs(found[10.0][right]) < 0.001
     assert found[10.0][left] == pytest.approx(0.03, abs=1e-3)
     assert abs(found[0.5e-2][left]) < 0.002
+
+
+def test_joints_of_both_sides_mirror_each_other():
+    """A hip whose leg shows no markers goes with the other one."""
+    truth = standing().person
+    q = random_poses(truth, 30, 0.4, seed=4)
+    markers, skeleton = markers_of(truth, q), truth.skeleton
+    for part in ("thigh_l", "shank_l", "foot_l"):
+        markers[:, truth.marker_segments == skeleton.index(part)] = np.nan
+    hips = [skeleton.index("thigh_l"), skeleton.index("thigh_r")]
+    first = replace(truth, joint_in_parent_m=truth.joint_in_parent_m.copy())
+    first.joint_in_parent_m[hips] += [[0.02, 0.02, -0.02], [0.02, 0.02, 0.02]]
+    error = {}
+    for tie in (1e-3, 10.0):
+        found = refine(first, markers, q, replace(LOOSE, mirror_sd_m=tie), IK).person
+        error[tie] = (found.joint_in_parent_m - truth.joint_in_parent_m)[hips]
+    np.testing.assert_allclose(error[10.0][0], [0.02, 0.02, -0.02], atol=1e-4)
+    np.testing.assert_allclose(error[1e-3][0], error[1e-3][1] * [1, 1, -1], atol=1e-4)
+    assert np.linalg.norm(error[1e-3][0]) < 0.7 * np.linalg.norm(error[10.0][0])
+
+
+def test_the_waist_is_tied_to_the_midline():
+    truth = standing().person
+    waist = truth.skeleton.index("upper_torso")
+    aside = replace(truth, joint_in_parent_m=truth.joint_in_parent_m.copy())
+    aside.joint_in_parent_m[waist, 2] += 0.03
+    q = random_poses(truth, 30, 0.4, seed=4)
+    found = {}
+    for tie in (1e-5, 10.0):
+        one = refine(truth, markers_of(aside, q), q, replace(LOOSE, mirror_sd_m=tie), IK).person
+        found[tie] = one.joint_in_parent_m[waist, 2] - truth.joint_in_parent_m[waist, 2]
+    assert found[10.0] > 0.02
+    assert abs(found[1e-5]) < 0.003
 
 
 def test_the_lengths_sd_tells_known_from_unknown():

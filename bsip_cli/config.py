@@ -125,7 +125,7 @@ class Prior(Section):
     com_sd_percent: float = Field(gt=0)
     midline_sd_m: float = Field(gt=0)
     origin_sd_m: float = Field(ge=0)
-    other_table_sd: float = Field(ge=0)
+    other_table_sd: float = Field(ge=0, le=0.7)
     left_right_correlation: float = Field(ge=0, lt=1)
     total_mass_sd_percent: float = Field(gt=0)
 

@@ -32,6 +32,7 @@ from bsip_cli.study.study import Trial
 # Where the iteration of the weights begins: force plates and skin make errors of this size.
 _FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 _WEIGHT_ROUNDS = 3
+_MASS_AND_ALONG = [0, 2]  # of the spreads: where there are figures of another table
 
 
 def prior_from(
@@ -53,10 +54,14 @@ def prior_from(
 
 
 def spread_from(unit: Unit, spreads: np.ndarray, **other: float) -> Spread:
-    """As configured, with the person's own ``spreads`` (n, 7): the columns of ``regression``."""
+    """As configured, with the person's own ``spreads`` (n, 7): the columns of ``regression``, less
+    the part of what tables differ by that all segments share."""
     options = {**unit.config.prior.model_dump(), **other}
-    options |= {"com_sd_percent": spreads[:, 1:4], "other_table_percent": spreads[:, 5:]}
-    return Spread(mass_sd_percent=spreads[:, 0], inertia_sd_percent=spreads[:, 4], **options)
+    own, tables = spreads[:, :5].copy(), spreads[:, 5:]
+    shared = options["other_table_sd"] * tables
+    own[:, _MASS_AND_ALONG] = np.sqrt(np.maximum(own[:, _MASS_AND_ALONG] ** 2 - shared**2, 0.0))
+    options |= {"com_sd_percent": own[:, 1:4], "other_table_percent": tables}
+    return Spread(mass_sd_percent=own[:, 0], inertia_sd_percent=own[:, 4], **options)
 
 
 def recordings_of(

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian, reada
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.identification.problem import Estimate, noise_of
 from bsip_cli.identification.uncertainty import readable
+from bsip_cli.stages.identification_problem import spread_from
 from tests.identification.synthetic_identification import SPREAD, world
 
 
@@ -207,3 +209,16 @@ def test_people_may_be_of_another_table_in_all_segments_together():
     expected = [0.5 * percent[i, 0] / 100 * bodies[i].mass_kg for i in (*thighs, pelvis)]
     assert np.abs(mass[[*thighs, pelvis]]) == pytest.approx(np.abs(expected), rel=1e-6)
     assert mass[thighs[0]] * mass[pelvis] < 0 < mass[thighs[0]] * mass[thighs[1]]
+
+
+def test_what_tables_differ_by_counts_once():
+    """What all segments share and what each has of its own make the difference over sqrt(2)."""
+    options = {"other_table_sd": 0.5, "midline_sd_m": 0.005, "left_right_correlation": 0.9}
+    prior = SimpleNamespace(model_dump=lambda: options | {"total_mass_sd_percent": 3.0})
+    unit = SimpleNamespace(config=SimpleNamespace(prior=prior))
+    people, differ = np.array([7.0, 1.0]), np.array([14.0, -11.0])
+    mass, along = np.sqrt(people**2 + differ**2 / 2)
+    spread = spread_from(unit, np.array([[mass, 3.0, along, 3.0, 20.0, *differ]]))
+    own = np.array([spread.mass_sd_percent[0], spread.com_sd_percent[0, 1]])
+    np.testing.assert_allclose(own**2 + (0.5 * differ) ** 2, people**2 + differ**2 / 2)
+    assert spread.com_sd_percent[0].tolist()[::2] == [3.0, 3.0]

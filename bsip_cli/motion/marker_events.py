@@ -168,11 +168,12 @@ _IN_PLACE = 0.3  # of the later residual at most, while the marker is in its pla
 def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
     """Events; residuals (N, m, 3) without jumps and slips.
 
-    The median residual of a marker must exceed ``_OFFSET`` times what it is trusted to and its
-    spread, and stand out from the median residuals of the others. Marker after marker is named
-    whose displacement explains most of all markers' median residuals, but for one whose distances
-    to its neighbours stay. One that was in its place first has slipped: where the pose follows a
-    slip, joint angles seem to explain it, and the search for slips is blind to it.
+    The median residual of a marker must exceed ``_OFFSET`` times what it is trusted to, its spread
+    and how far it strays in all trials, and stand out from the median residuals of the others.
+    Marker after marker is named whose displacement explains most of all markers' median residuals,
+    but for one whose distances to its neighbours stay. One that was in its place first has slipped:
+    where the pose follows a slip, joint angles seem to explain it, and the search for slips is
+    blind to it.
     """
     seen = np.isfinite(residual[..., 0])
     enough = seen.sum(axis=0) >= max(3, _LEAST_SHARE * len(residual))
@@ -183,7 +184,8 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
     about = np.linalg.norm(residual[:, enough] - mean[enough], axis=2)
     spread[enough] = np.nanmedian(about, axis=0) / MEDIAN_LENGTH
     usual = float(np.median(np.linalg.norm(mean[enough], axis=1)))
-    limit = np.maximum(_OFFSET * np.maximum(fit.trusted_m, spread), _STANDS_OUT * usual)
+    own = np.maximum(np.maximum(fit.trusted_m, fit.strays_m), spread)
+    limit = np.maximum(_OFFSET * own, _STANDS_OUT * usual)
     sd = np.where(enough, np.hypot(max(usual, 1e-4), spread), np.nan)
     # Where two markers make a segment's pose, it takes up most of an offset.
     least = BEYOND * fit.trusted_m

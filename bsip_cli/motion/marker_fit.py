@@ -34,6 +34,7 @@ class MarkerFit:
     measured_m, model_m : (N, m, 3) world; NaN where a marker is missing.
     residual_m : (N, m, 3) measured less model, in the axes of the marker's segment.
     marker_sd_m, robust_limit_m : of the inverse kinematics.
+    strays_m : (m,) how far it was from its place in the frames that scaled the person, RMS.
     """
 
     person: Person
@@ -44,6 +45,7 @@ class MarkerFit:
     residual_m: np.ndarray
     marker_sd_m: float
     robust_limit_m: float
+    strays_m: np.ndarray
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -125,14 +127,16 @@ class MarkerFit:
     def is_shown(self, m: int, vector: np.ndarray, longer_m: Mapping[int, Uncertain]) -> bool:
         """Whether the distances to other markers of its segment, which no pose can change, are
         longer, each known to a standard deviation, by what a displacement (3,) of marker ``m`` on
-        the segment would make them; where that would not show, it is believed."""
+        the segment would make them; where that is less than it is trusted to, in doubt."""
         if not longer_m:
             return True
         places, others = self.person.marker_positions_m, list(longer_m)
         seen, sd = np.array(list(longer_m.values())).T
         apart = places[m] - places[others]
-        made = (np.linalg.norm(apart + vector, axis=1) - np.linalg.norm(apart, axis=1)) / sd
-        return bool(made @ (seen / sd) + _SURE * np.linalg.norm(made) > _SHOWN * made @ made)
+        made = np.linalg.norm(apart + vector, axis=1) - np.linalg.norm(apart, axis=1)
+        would_show = np.abs(made).max() > self.trusted_m[m]
+        doubt = 0.0 if would_show else _SURE * float(np.linalg.norm(made / sd))
+        return bool((made / sd) @ (seen / sd) + doubt > _SHOWN * (made / sd) @ (made / sd))
 
     def neighbours(self, m: int) -> list[int]:
         """The other markers of its segment."""
@@ -177,11 +181,14 @@ def marker_fit(
     *,
     marker_sd_m: float,
     robust_limit_m: float,
+    strays_m: np.ndarray | None = None,
 ) -> MarkerFit:
     """Compare fitted poses q (N, nq) with the markers (N, m, 3) in the order of the person's.
 
-    ``marker_sd_m`` and ``robust_limit_m`` are those of the inverse kinematics.
+    ``marker_sd_m`` and ``robust_limit_m`` are those of the inverse kinematics; ``strays_m`` (m,) as
+    in :class:`MarkerFit`, by default zero.
     """
-    at, scales = posed(person, q), (marker_sd_m, robust_limit_m)
+    at, strays = posed(person, q), np.zeros(len(person.markers)) if strays_m is None else strays_m
+    scales = marker_sd_m, robust_limit_m, strays
     residual = at.residuals(markers_m)
     return MarkerFit(person, q, times_s, markers_m, at.markers_m, residual, *scales)

@@ -32,6 +32,7 @@ def run(unit: Unit) -> None:
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
     poses, decided = _solved(unit, person, markers)
     scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
+    scales["strays_m"] = unit.read("marker-positions")["residual_m"].fillna(0.0).to_numpy()
 
     def refit(other: np.ndarray, at: np.ndarray) -> MarkerFit:
         return marker_fit(person, other, _solved(unit, person, other)[0].q, at, **scales)

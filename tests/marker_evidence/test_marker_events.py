@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,6 +118,15 @@ def test_an_offset_of_25_mm(label):
     assert (event.start_s, event.end_s) == pytest.approx((0.0, 7.98))
     assert event.size_m == pytest.approx(0.025, abs=0.006)
     assert event.sentence.endswith("throughout the trial")
+
+
+def test_a_marker_that_strays_as_far_in_other_trials_sits_in_its_place():
+    """A shoulder's skin goes with the arm: nothing is peculiar to this trial."""
+    times, markers = moved(3, "LELB", 0.025, slice(None))
+    fit = fitted(markers, times)
+    assert [one.marker for one in offsets(fit, fit.residual_m)] == ["LELB"]
+    fit = replace(fit, strays_m=np.where(np.array(MARKERS) == "LELB", 0.02, 0.0))
+    assert offsets(fit, fit.residual_m) == []
 
 
 def test_an_offset_says_how_rarely_it_is_seen_and_that_it_may_be_another_marker():

@@ -180,9 +180,9 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         if before and before == after:
             found = "as it stands, it does not drive the body as the markers move"
             findings.append(Finding("plate_force", name, found, _DRIVES, words, "corrected"))
-        else:
+        elif before:  # of a plate that nobody loads nothing is corrected
             action = f"{words}: {after}" if after else f"{words}, as of the other plates"
-            findings.append(about_place(name, before or "never loaded", action, "corrected"))
+            findings.append(about_place(name, before, action, "corrected"))
     if reading.half_size_m is not None:
         sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
         found = "its load lies beside its outline and under a foot"

@@ -139,7 +139,8 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
     for t, trial in zip(one.trials, one.in_trials, strict=True):
         piece, block = fit.pieces[t], trial.blocks
         mine = block[:, None, None] == np.arange(block.max() + 1)
-        white = piece.noise.white(np.where(mine, one.filtered_change(trial)[..., None], 0.0))
+        change = one.columns(t)[0][..., one.is_free] @ (one.values / one.typical)[one.is_free]
+        white = piece.noise.white(np.where(mine, change[..., None], 0.0))
         pulls.append(white.T @ piece.left(fit.mean) / inflation[t])
         alone, together = (x @ (piece.white.T @ white) for x in fit.solution.roots(t))
         grams.append((white.T @ white - alone.T @ alone) / inflation[t])

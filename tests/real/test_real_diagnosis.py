@@ -60,6 +60,18 @@ def test_an_offset_hidden_in_a_real_recording_is_found_with_its_size(tmp_path):
     assert abs(gain + 0.0406) < 0.003
 
 
+def test_a_delay_hidden_in_real_recordings_is_named_with_its_size(tmp_path):
+    """15 ms, where forces come 5 to 6 ms late by cross-correlation already."""
+    names = {"static": "static1", "squats": "squats1", "sitstand": "STS1"}
+    study = study_on_two_plates(tmp_path / "study", **names)
+    hidden = ("--effect", "sync_offset", "--size", "0.015", "--target", "-")
+    bsip("inject", study, tmp_path / "copy", *hidden)
+    found = diagnosis_of(tmp_path / "copy", tmp_path / "out").set_index("effect")
+    delay = found.loc[["sync_offset"]].iloc[0]
+    assert (delay["verdict"], delay["parameter"]) == ("named", "delay")
+    assert abs(delay["estimate"] - 0.0205) < 0.002
+
+
 def test_a_mass_hidden_in_one_recording_is_not_told_of_the_other(tmp_path):
     """1 kg in squats, where plates read 2.6 kg less than stated in all trials."""
     names = {"static": "static1", "squats": "squats1", "sitstand": "STS1"}

@@ -83,19 +83,20 @@ def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()
     """named_from : probability from which on one name is said; else so many as hold it. known :
     faults that are there for other reasons; they come first in the fit and have no verdict."""
     fit, refuted = fitted(library.session, known), frozenset[Where]()
-    while len(fit.faults) < len(known) + _MOST:
-        tried = one_round(library, fit, refuted)
-        if not tried or tried[0].log_odds < 0:
-            break
-        before = fit
+    tried = one_round(library, fit)
+    while tried and tried[0].log_odds >= 0 and len(fit.faults) < len(known) + _MOST:
+        before, uneven = fit, -np.inf
         fit = corrected(fitted(library.session, tried[0].fit.faults, start=tried[0].fit))
         if _can_be_uneven(fit.faults[-1]):  # is it likelier of another size in every second?
             inflation = scores_of(library, fit).inflation
-            log = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
-            if log >= 0 and _moves_others(before, fit, inflation):
-                refuted, fit = refuted | {_place_of(fit.faults[-1])}, before
-            elif log >= 0:
-                fit = _unnamed(fit)
+            uneven = unevenness(fit, len(fit.faults) - 1, inflation) + np.log(library.prior_odds)
+            if uneven >= 0 and _moves_others(before, fit, inflation):
+                refuted, fit, uneven = refuted | {_place_of(fit.faults[-1])}, before, -np.inf
+        tried = one_round(library, fit, refuted)
+        # what no fault explains yet may seem to be it: then one more is likelier
+        if uneven >= max([0.0, *(one.log_odds for one in tried[:1])]):
+            fit = _unnamed(fit)
+            tried = one_round(library, fit, refuted)
     fit, verdicts = _judged(library, fit, named_from, len(known), refuted)
     hardly = [(one.fault, float(expit(one.log_odds))) for one in tried]
     said = set()

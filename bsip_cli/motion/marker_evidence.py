@@ -272,16 +272,18 @@ def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.n
     squares) do not explain, since skin follows them; the strongest is traced to the marker that
     explains the changes of all, and taken out; and so on.
     """
-    search, found = _Search(fit, residual), []
+    search, found, others = _Search(fit, residual), list[_Slip](), list[_Slip]()
     for _ in range(_MOST):
         changes = search.changes()
         if not changes:
             break
         slip, made = search.source(max(changes, key=lambda m: changes[m].z), changes)
         search.take(slip, made)
-        is_large = np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]
-        if is_large and search.is_shown_by_distances(slip):
-            found.append(slip)
+        if np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]:
+            (found if search.is_shown_by_distances(slip) else others).append(slip)
+    # what moves where something else changes at that time is skin, not a tape that gives way
+    near = _STAYS_S / fit.step_s()
+    found = [one for one in found if all(abs(one.frame - x.frame) > near for x in others)]
     return _events(fit, found, search.frames), search.left
 
 

@@ -207,7 +207,7 @@ def _moving_joints(person: Person, segment: int) -> list[int]:
 def _prior_precision(
     person: Person, parameters: tuple[_Parameter, ...], options: ScalingOptions
 ) -> np.ndarray:
-    """(P, P) precision of the priors; left and right lengths and joints pull each other, and the
+    """(P, P) precision of the priors; left and right lengths and hips pull each other, and the
     midline's joints and segments to its plane."""
     precision = np.diag([parameter.sd**-2 for parameter in parameters])
     lengths = {p.index: k for k, p in enumerate(parameters) if p.kind == "length"}
@@ -223,10 +223,10 @@ def _prior_precision(
         for k, p in enumerate(parameters)
         if p.kind in ("joint", "origin", "shift")
     }
-    tie = options.mirror_sd_m**-2
+    tie, hips = options.mirror_sd_m**-2, {segments[k] for k in _children(person, 0)}
     for (kind, name, axis), k in places.items():
         twin, sign = places.get((kind, mirrored(name), axis), k), -1.0 if axis == _SIDEWAYS else 1.0
-        if twin > k and kind != "shift":
+        if twin > k and name in hips and kind == "joint":  # shoulders glide on the chest
             precision[np.ix_([k, twin], [k, twin])] += tie * np.array([[1, -sign], [-sign, 1]])
         elif twin == k and mirrored(name) == name and axis == _SIDEWAYS:
             precision[k, k] += tie

@@ -202,7 +202,7 @@ def test_left_and_right_are_tied_softly():
     assert abs(found[0.5e-2][left]) < 0.002
 
 
-def test_joints_of_both_sides_mirror_each_other():
+def test_hips_mirror_each_other():
     """A hip whose leg shows no markers goes with the other one."""
     truth = standing().person
     q = random_poses(truth, 30, 0.4, seed=4)

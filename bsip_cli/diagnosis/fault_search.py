@@ -94,7 +94,7 @@ def search(library: Library, named_from: float, known: Sequence[Hypothesis] = ()
                 refuted, fit, uneven = refuted | {_place_of(fit.faults[-1])}, before, -np.inf
         tried = one_round(library, fit, refuted)
         # what no fault explains yet may seem to be it: then one more is likelier
-        if uneven >= max([0.0, *(one.log_odds for one in tried[:1])]):
+        if uneven >= 0 and not (tried and tried[0].log_odds > uneven):
             fit = _unnamed(fit)
             tried = one_round(library, fit, refuted)
     fit, verdicts = _judged(library, fit, named_from, len(known), refuted)

@@ -14,10 +14,11 @@ swap (marker_exchange.py)
 jump
     The residual leaves its running median for less than a quarter second and comes back.
 slip
-    The mean residual goes to another level and stays there, and the joint angles do not explain
-    it.
+    The mean residual goes to another level and stays there, the joint angles do not explain it, and
+    the distances to the segment's other markers show it.
 offset
-    The median residual of the whole trial is far beyond the spread and that of the others.
+    The median residual of the whole trial is far beyond the spread, how far the marker strays in
+    other trials, and that of the others.
 
 A marker that slips or sits wrong drags the pose, and its neighbours' residuals with it. The
 linear response of the fit shows which marker explains the residuals of all; only that one is

@@ -210,26 +210,23 @@ def _prior_precision(
     """(P, P) precision of the priors; left and right lengths and hips pull each other, and the
     midline's joints and segments to its plane."""
     precision = np.diag([parameter.sd**-2 for parameter in parameters])
-    lengths = {p.index: k for k, p in enumerate(parameters) if p.kind == "length"}
     segments = person.skeleton.segments
-    for index, left in lengths.items():
-        name = segments[index]
-        if name.endswith("_l") and f"{name[:-1]}r" in segments:
-            right = lengths[segments.index(f"{name[:-1]}r")]
-            tie = (options.symmetry_sd * person.lengths_m[index]) ** -2
-            precision[np.ix_([left, right], [left, right])] += tie * np.array([[1, -1], [-1, 1]])
-    places = {
-        (p.kind, segments[p.index], p.moves[0][1][1]): k
+    hips = {segments[child] for child in _children(person, 0)}  # shoulders glide on the chest
+    numbers = {
+        (p.kind, segments[p.index], p.moves[0][1][1:]): k
         for k, p in enumerate(parameters)
-        if p.kind in ("joint", "origin", "shift")
+        if p.kind in ("length", "joint", "origin", "shift")
     }
-    tie, hips = options.mirror_sd_m**-2, {segments[k] for k in _children(person, 0)}
-    for (kind, name, axis), k in places.items():
-        twin, sign = places.get((kind, mirrored(name), axis), k), -1.0 if axis == _SIDEWAYS else 1.0
-        if twin > k and name in hips and kind == "joint":  # shoulders glide on the chest
-            precision[np.ix_([k, twin], [k, twin])] += tie * np.array([[1, -sign], [-sign, 1]])
-        elif twin == k and mirrored(name) == name and axis == _SIDEWAYS:
-            precision[k, k] += tie
+    for (kind, name, axis), k in numbers.items():
+        twin, sign = numbers.get((kind, mirrored(name), axis)), -1 if axis == (_SIDEWAYS,) else 1
+        sd_m = options.mirror_sd_m
+        if kind == "length":
+            sd_m = options.symmetry_sd * person.lengths_m[parameters[k].index]
+        is_tied = kind == "length" or (kind == "joint" and name in hips)
+        if twin is not None and is_tied and name.endswith("_l"):
+            precision[np.ix_([k, twin], [k, twin])] += sd_m**-2 * np.array([[1, -sign], [-sign, 1]])
+        elif twin == k and sign < 0:
+            precision[k, k] += sd_m**-2
     return precision
 
 

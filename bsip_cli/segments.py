@@ -42,6 +42,13 @@ def the_joint(name: str) -> str:
     return f"the {in_words(name)}" + (" joint" if name.startswith("sternoclavicular") else "")
 
 
+def how_held(segment: str, neutral: str = "") -> str:
+    """What is done with a segment that has no markers; ``neutral`` : more of the neutral pose."""
+    if segment == "head":
+        return "it is held upright"
+    return f"its joint is held at the neutral pose{neutral}"
+
+
 def without_side(name: str) -> str:
     """The kind of segment: upper_arm for upper_arm_l; what has no side, itself."""
     return name[:-2] if name[-2:] in _SIDES else name

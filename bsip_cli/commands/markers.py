@@ -25,7 +25,7 @@ from bsip_cli.recordings.marker_guess import (
 )
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.segments import in_words, without_side
+from bsip_cli.segments import how_held, in_words, without_side
 
 _ALTERNATIVES = 3
 
@@ -143,7 +143,7 @@ def _segment_rows(
         if gone:
             text += f"; missing: {', '.join(gone)}"
         if segment in held:
-            text += "; its joint is held at the neutral pose, with the table's inertia"
+            text += f"; {how_held(segment)}, with the table's inertia"
         elif segment in unmarked:
             text += "; refused, unless scale.may_be_held in study.toml names it"
         yield text

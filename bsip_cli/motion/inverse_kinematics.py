@@ -160,6 +160,30 @@ def first_pose(person: Person, markers_m: np.ndarray, **options: Any) -> np.ndar
     return best
 
 
+_LYING = 0.5  # cosine of the trunk's lean, median over a trial: who lies holds no head upright
+
+
+def held_upright(person: Person, q: np.ndarray) -> np.ndarray:
+    """Poses q (N, nq) with the head, which no marker shows, upright on the leaning trunk.
+
+    People who stand, walk or land keep it within some ten degrees of the vertical (Pozzo 1990,
+    Exp Brain Res 82:97); the neck makes the smallest turn that does so. Beyond 90 degrees of lean
+    it gives way, as in who stands on the hands. Where the trunk lies, q is returned as it is.
+    """
+    head = person.skeleton.index("head")
+    trunk = posed(person, q).R[:, person.skeleton.parents[head]]
+    up = trunk[:, 2]  # the world's vertical in the trunk's axes
+    if np.median(up[:, 1]) < _LYING:
+        return q
+    lean = np.arccos(np.clip(up[:, 1], -1.0, 1.0))
+    axis = np.cross([0.0, 1.0, 0.0], up)
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    turned, at = q.copy(), person.skeleton.q_starts[head]
+    neck = Rotation.from_rotvec(axis * np.minimum(lean, np.pi - lean)[:, None])
+    turned[:, at : at + 4] = neck.as_quat()
+    return turned
+
+
 def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Move ``q``'s base so that the model's markers lie on one frame's markers (m, 3), rigidly.
 

@@ -197,13 +197,14 @@ def _source(
     rows = onto_grid(grid, np.hstack(parts), samples_s)
     columns = iter(np.split(rows, len(parts), axis=1))
     missing = ~np.isfinite(rows).all(axis=1)
-    height = [] if point is None else point[loaded] @ rotation[2]
+    height = np.zeros(0) if point is None else point[loaded] @ rotation[2]
+    height = height[np.isfinite(height)]
     source = ForceOnPoint(
         name=force.name,
         force_N=next(columns),
         points=None if point is None else next(columns),
         moment=next(columns, np.zeros((len(rows), 3))),  # without columns: no free torque, and said
-        point_height=float(np.nanmedian(height)) if len(height) else 0.0,
+        point_height=float(np.median(height)) if len(height) else 0.0,
         points_move=point is not None and points_that_move(point, loaded),
         known=~missing,
         rotation_world_lab=rotation,

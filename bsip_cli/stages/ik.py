@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
-from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
+from bsip_cli.motion.inverse_kinematics import Poses, held_upright, solve_trial
 from bsip_cli.motion.marker_events import summaries
 from bsip_cli.motion.marker_evidence import marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
@@ -58,7 +58,8 @@ def run(unit: Unit) -> None:
 
 
 def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
-    """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
+    """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral, the
+    head upright."""
     options = unit.config.ik
     fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
     poses = solve_trial(person, markers, posture_sd_rad=options.posture_sd_rad, **fixed)
@@ -69,7 +70,15 @@ def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.
     if not decided.all():
         sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
         poses = solve_trial(person, markers, posture_sd_rad=sd, **fixed)
+    if not decided[_neck(person.skeleton)].any():
+        poses = replace(poses, q=held_upright(person, poses.q))
     return poses, decided
+
+
+def _neck(skeleton: Skeleton) -> slice:
+    """Its velocities."""
+    start = skeleton.v_starts[skeleton.index("head")]
+    return slice(start, start + 3)
 
 
 def _determined(
@@ -87,7 +96,8 @@ def _determined(
             for joint, count, size in counts
             if count
         )
-        unit.say(f"no markers decide {names}; held near the neutral pose")
+        upright = "" if decided[_neck(skeleton)].any() else ", the head upright"
+        unit.say(f"no markers decide {names}; held near the neutral pose{upright}")
     sd = np.where(decided, poses.coordinate_sd, 0.0)
     sd[:, :3] = 0.0  # the base's position is in metres
     of_joint = np.maximum.reduceat(sd, skeleton.v_starts, axis=1)

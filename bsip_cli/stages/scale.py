@@ -17,7 +17,7 @@ from bsip_cli.motion.plausible_body import Doubt, doubts_about, words_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, TrialMarkers, refine_over_trials
 from bsip_cli.recordings.scene import Stature, stature
 from bsip_cli.running.unit import Unit
-from bsip_cli.segments import in_words, without_side
+from bsip_cli.segments import how_held, in_words, without_side
 from bsip_cli.stages.frames import XYZ, columns, markers_from, ordered_markers
 from bsip_cli.stages.person_mass import ENTRY, TABLE, person_mass
 from bsip_cli.study.study import Trial
@@ -203,10 +203,8 @@ def _warn_missing(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
         segment, parent = skeleton.segments[i], skeleton.segments[skeleton.parents[i]]
         known = marker_set.on(segment)
         serve = f"; {known} would do" if known else ""
-        unit.say(
-            f"no markers on the {in_words(segment)}: its joint is held at the neutral "
-            f"pose, in line with the {in_words(parent)}{serve}"
-        )
+        held = how_held(segment, f", in line with the {in_words(parent)}")
+        unit.say(f"no markers on the {in_words(segment)}: {held}{serve}")
 
 
 def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:

@@ -61,7 +61,7 @@ def test_what_is_missing_on_which_segment(here, capsys):
     path = recording(here, [label for label in HANSEN if label not in gone], empty=["C7"])
     assert told(path) == 3
     said = capsys.readouterr().out
-    assert "  head              0 markers; missing: RTEM, LTEM, FHEAD; its joint is held" in said
+    assert "  head              0 markers; missing: RTEM, LTEM, FHEAD; it is held upright" in said
     assert "  left hand         2 markers; missing: LWRU\n" in said
     assert "  C7     seen   0.0 %  labelled, but seen in no frame\n" in said
     assert "a skeleton cannot be built without: malleolus_lateral_r\n" in said

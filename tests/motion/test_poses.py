@@ -10,6 +10,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.motion.inverse_kinematics import (
     coordinate_covariance,
     first_pose,
+    held_upright,
     neutral,
     place_base,
     posed,
@@ -328,3 +329,39 @@ def test_a_person_who_walks_in_and_out_is_solved_between(person):
     assert np.isnan(poses.residual_m[[0, 11]]).all()
     assert (poses.coordinate_sd[[0, 11]].max(axis=1) > 1.0).all()
     assert np.isfinite(poses.q).all()
+
+
+def leaning(person, leans_rad, about):
+    """Poses of one who tilts as a whole about a level axis of the world."""
+    turns = [pin.exp3(lean * np.array(about)) for lean in leans_rad]
+    q = np.tile(neutral(person), (len(leans_rad), 1))
+    upright = np.column_stack([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])
+    q[:, 3:7] = [pin.Quaternion(turn @ upright).coeffs() for turn in turns]
+    return q
+
+
+@pytest.mark.parametrize("about", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.6, -0.8, 0.0)])
+def test_an_unmarked_head_stays_upright_on_a_leaning_trunk(person, about):
+    head, q = person.skeleton.index("head"), leaning(person, np.radians(range(86)), about)
+    turned = posed(person, held_upright(person, q))
+    np.testing.assert_allclose(
+        turned.R[:, head, :, 1], np.tile([0.0, 0.0, 1.0], (86, 1)), atol=1e-6
+    )
+    others = [i for i in range(len(person.skeleton.segments)) if i != head]
+    np.testing.assert_allclose(turned.R[:, others], posed(person, q).R[:, others], atol=1e-12)
+    neck = np.einsum("fji,fjk->fik", turned.R[:, head - 1], turned.R[:, head])
+    assert abs(pin.log3(neck[40])[1]) < 0.02  # it does not turn about its own axis
+
+
+def test_a_head_upside_down_hangs_and_passes_through_without_a_leap(person):
+    q = leaning(person, np.linspace(0.0, 2.0 * np.pi, 721), (0.0, 1.0, 0.0))
+    q = np.concatenate([np.tile(q[:1], (800, 1)), q])  # and stands most of the time
+    head = person.skeleton.index("head")
+    R = posed(person, held_upright(person, q)).R[:, head]
+    assert np.linalg.norm(np.diff(R[:, :, 1], axis=0), axis=1).max() < np.radians(1.1)
+    assert R[800 + 360, 2, 1] < -0.99  # on the hands
+
+
+def test_the_head_of_one_who_lies_stays_in_line(person):
+    q = leaning(person, np.radians(np.linspace(75.0, 95.0, 50)), (0.0, 1.0, 0.0))
+    np.testing.assert_array_equal(held_upright(person, q), q)

@@ -14,6 +14,7 @@ from bsip_cli.motion.marker_events import summaries
 from bsip_cli.motion.marker_evidence import marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
+from bsip_cli.report.words import count
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import the_joint
 from bsip_cli.stages.frames import columns, markers_from, ordered_markers, person_of, rate_of
@@ -92,9 +93,9 @@ def _determined(
         angles = zip(skeleton.joints, np.split(decided, skeleton.v_starts[1:]), strict=True)
         counts = [(joint, int((~own).sum()), len(own)) for joint, own in angles]
         names = ", ".join(
-            (f"{count} of {size} coordinates of " if count < size else "") + the_joint(joint)
-            for joint, count, size in counts
-            if count
+            (f"{lost} of {size} coordinates of " if lost < size else "") + the_joint(joint)
+            for joint, lost, size in counts
+            if lost
         )
         upright = "" if decided[_neck(skeleton)].any() else ", the head upright"
         unit.say(f"no markers decide {names}; held near the neutral pose{upright}")
@@ -108,8 +109,8 @@ def _determined(
     whole = zip(skeleton.joints, known.all(axis=0), strict=True)
     lost = [the_joint(name) for name, ok in whole if not ok]
     if lost:
-        count = int((~known.all(axis=1)).sum())
-        unit.say(f"{count} frames without a pose of {', '.join(lost)}")
+        frames = count(int((~known.all(axis=1)).sum()), "frame")
+        unit.say(f"{frames} without a pose of {', '.join(lost)}")
     return known, of_joint.max(axis=1)
 
 

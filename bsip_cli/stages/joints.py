@@ -32,7 +32,7 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import coordinate_information
 from bsip_cli.recordings.contacts import SIDES, FootForces, foot_forces, plate_noise
 from bsip_cli.recordings.model import Plate
-from bsip_cli.report.words import listing
+from bsip_cli.report.words import count, listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words
 from bsip_cli.stages.frames import (
@@ -69,7 +69,7 @@ def run(unit: Unit) -> None:
     counts = {words: out.sum(axis=0).tolist() for words, out in reasons.items()}
     _report(unit, trial, counts)
     left_out = {
-        joint: "; ".join(f"{words}: {n[j]} frames" for words, n in counts.items() if n[j])
+        joint: "; ".join(f"{words}: {count(n[j], 'frame')}" for words, n in counts.items() if n[j])
         for j, joint in enumerate(person.skeleton.joints[1:])
     }
     noise = _of_accelerations(trial, phi[:, -1])
@@ -203,8 +203,8 @@ def _report(unit: Unit, trial: _Trial, counts: Mapping[str, Sequence[int]]) -> N
             which = "all joints" if len(alike) == len(joints) else listing(_legs(alike))
             parts.append(f"{which} in {frames} ({words})")
     if parts:
-        count = len(trial.times_s)
-        unit.say(f"joint moments left out of {count} frames: {'; '.join(parts)}")
+        all_of_them = count(len(trial.times_s), "frame")
+        unit.say(f"joint moments left out of {all_of_them}: {'; '.join(parts)}")
 
 
 def _legs(joints: list[str]) -> list[str]:

@@ -27,7 +27,7 @@ from tests.diagnosis.noisy_trial import (
     part_of_moving,
     shown,
 )
-from tests.effects.moving_scene import MASS_KG
+from tests.effects.moving_scene import MASS_KG, standing_still
 
 WEIGHT_N = MASS_KG * 9.81
 YARDSTICKS = Yardsticks(0.03, 0.05, 0.5, WEIGHT_N)
@@ -130,6 +130,18 @@ def test_a_plate_that_is_turned_is_a_large_error_whatever_could_swallow_it():
     assert found.effect == "unexplained" and found.verdict == "named"
     assert found.sentence.startswith("large error, cause unknown")
     assert {"a"} == set(found.trials)
+
+
+@pytest.mark.parametrize(("aside_m", "is_large"), [(0.065, True), (0.01, False)])
+def test_ordinary_errors_do_not_stretch_over_a_large_one_that_is_the_same_all_the_time(
+    aside_m, is_large
+):
+    """Of a plate aside under one who stands still, they would leave a third."""
+    still = standing_still(6.0)
+    moment = np.zeros((len(still.times_s), 6))
+    moment[:, 3] = aside_m * still.predicted[:, 2]
+    found = large(noisy(shown(still, moment), 3))
+    assert [one.words.what[:11] for one in found] == ["large error"] * is_large
 
 
 def test_terms_add_up_in_the_centre_of_pressure_without_approximation():

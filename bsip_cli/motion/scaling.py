@@ -24,7 +24,8 @@ from bsip_cli.motion.inverse_kinematics import (
     subtrees,
 )
 from bsip_cli.motion.marker_events import offsets
-from bsip_cli.motion.marker_fit import marker_fit
+from bsip_cli.motion.marker_exchange import Labelling, relabelled
+from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.segments import mirrored
 
 IkOptions = Mapping[str, Any]  # keyword options of :func:`solve_poses`
@@ -333,8 +334,9 @@ def refine_over_trials(
 ) -> Refinement:
     """Fit the geometry to ``frames`` frames of all trials that differ most.
 
-    A marker that is misplaced throughout fewer than half of the trials has no say there, since it
-    would drag its place in the model towards the middle: the fit is made again without it.
+    Exchanged labels, and a marker that is misplaced throughout fewer than half of the trials, would
+    drag places in the model towards their middle. Labels are corrected by the calibration before
+    the fit; of such a marker the fit is made again without it.
 
     standing : the one frame that the calibration is like, of the trial with this number.
     ik : keyword options of :func:`solve_poses`.
@@ -342,7 +344,11 @@ def refine_over_trials(
     person, seen = calibration.person, []  # some of the frames that show nearly all markers
     for one in trials:
         fewer = one.frames(slice(None, None, max(1, len(one.times_s) // _FRAMES_PER_TRIAL)))
-        seen.append(fewer.frames(np.isfinite(fewer.markers_m[..., 0]).mean(axis=1) > _MOST))
+        fewer = fewer.frames(np.isfinite(fewer.markers_m[..., 0]).mean(axis=1) > _MOST)
+        if len(fewer.times_s):
+            labelled = relabelled(_labelling(person, fewer, ik)).fit
+            fewer = replace(fewer, markers_m=labelled.measured_m)
+        seen.append(fewer)
 
     def refined(standing: TrialMarkers, seen: Sequence[TrialMarkers]) -> Refinement:
         markers = [standing.markers_m, *(one.markers_m for one in seen if len(one.times_s))]
@@ -361,12 +367,21 @@ def refine_over_trials(
     return refined(standing.without(misplaced[standing_trial]), kept)
 
 
+def _labelling(person: Person, one: TrialMarkers, ik: IkOptions) -> Labelling:
+    """A trial's markers as labelled, and the poses fitted to them."""
+    scales = {name: ik[name] for name in ("marker_sd_m", "robust_limit_m")}
+
+    def fitted(markers_m: np.ndarray, times_s: np.ndarray) -> MarkerFit:
+        poses = solve_trial(person, markers_m, **ik)
+        return marker_fit(person, markers_m, poses.q, times_s, **scales)
+
+    return Labelling(fitted(one.markers_m, one.times_s), fitted)
+
+
 def _misplaced(person: Person, one: TrialMarkers, ik: IkOptions) -> np.ndarray:
     """(m,) markers that are not where the model has them throughout a trial."""
     if not len(one.times_s):
         return np.zeros(len(person.markers), dtype=bool)
-    poses = solve_trial(person, one.markers_m, **ik)
-    scales = {name: ik[name] for name in ("marker_sd_m", "robust_limit_m")}
-    fit = marker_fit(person, one.markers_m, poses.q, one.times_s, **scales)
+    fit = _labelling(person, one, ik).fit
     off = {event.marker for event in offsets(fit, fit.residual_m) if event.kind == "offset"}
     return np.isin(person.markers, list(off))

@@ -3,15 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from bsip_cli.dynamics.ground_wrench import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import posed, solve_poses, subtrees
 from bsip_cli.motion.scaling import (
     ScalingOptions,
+    TrialMarkers,
     _column,
     _parameters,
     _with,
     refine,
+    refine_over_trials,
     varied_frames,
 )
 from tests.body.standing_person import (
@@ -263,3 +267,30 @@ def test_varied_frames_are_the_farthest_apart():
     spin = np.linalg.qr(np.random.default_rng(0).normal(size=(50, 3, 3)))[0]
     spin *= np.linalg.det(spin)[:, None, None]
     assert varied_frames(spin[:, None] @ R, 3).tolist()[::2] == [0, 49]
+
+
+def scaled(exchanged):
+    """The standing person from four trials, in the last of which labels are exchanged."""
+    calibration = standing()
+    person, order = calibration.person, np.arange(len(calibration.person.markers))
+    for pair in exchanged:
+        at = [person.markers.index(label) for label in pair]
+        order[at] = order[at[::-1]]
+    standing_markers = TrialMarkers(np.zeros(1), markers_of(person, calibration.q[None]))
+    trials, model = [], pinocchio_model(person)
+    for seed in range(4):
+        first, last = random_poses(person, 2, 0.4, seed)
+        q = [pin.interpolate(model, first, last, part) for part in np.linspace(0, 1, 60)]
+        trials.append(TrialMarkers(np.arange(60) / 100, markers_of(person, np.array(q))))
+    trials[3] = replace(trials[3], markers_m=trials[3].markers_m[:, order])
+    usual = replace(LOOSE, joint_centre_sd_m=0.015, length_sd=0.04, marker_sd_m=0.008)
+    ik = IK | {"marker_sd_m": 0.005, "robust_limit_m": 0.025}
+    return refine_over_trials(calibration, standing_markers, 0, trials, 40, usual, ik).person
+
+
+@pytest.mark.parametrize("pairs", [["RASIS RPSIS", "LASIS LPSIS"], ["RELB LELB"], ["T10 XIPH"]])
+def test_labels_exchanged_in_one_trial_do_not_scale_the_person(pairs):
+    """A pelvis whose front is its back drew its places to the middle, and the hips with them."""
+    found, right = scaled([pair.split() for pair in pairs]), scaled([])
+    np.testing.assert_allclose(found.marker_positions_m, right.marker_positions_m, atol=1e-4)
+    np.testing.assert_allclose(found.joint_positions_m(), right.joint_positions_m(), atol=1e-4)

@@ -46,8 +46,8 @@ def test_every_circumstance_has_an_outcome_and_a_wrong_one_says_what(few):
 
 
 @pytest.mark.long(minutes=20)
-def test_fifty_circumstances_keep_the_limits():
-    judgements = examined(SEED, range(50), jobs=2)
+def test_a_hundred_circumstances_keep_the_limits():
+    judgements = examined(SEED, range(100), jobs=2)
     changed = [j for j in judgements if "sound" not in j.kinds]
     sound = [j for j in judgements if "sound" in j.kinds]
     print(table(judgements))

@@ -163,11 +163,12 @@ def light_of(
 
 
 def mostly(budget: pd.DataFrame | None, found: Collection[str], even_with_om: bool) -> str:
-    """Of a large error, what makes most of it, one part or two: ``, most of it soft tissue (56 %)``;
-    else the largest part."""
+    """Of a large error, what makes most of it, one part or two; what was not found only goes along
+    with it: ``, most of it along with soft tissue (56 %)``; else the largest part."""
     ranked, is_left = ranked_parts(budget, found, even_with_om)
     parts = [(one.label, one.share) for one in ranked[:2]] + [("", 0.0)] * 2
-    return say("mostly", is_left=is_left, parts=parts, nameless=("", *NO_CAUSE))
+    sure = bool(ranked) and {*ranked[0].terms} <= {f"{budgets.FAULT}:{x}" for x in found}
+    return say("mostly", is_left=is_left, parts=parts, sure=sure, nameless=("", *NO_CAUSE))
 
 
 def ranked_parts(

@@ -239,7 +239,7 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, most of it the table's segment parameters (70 %); 2 findings"
+        "Large error, most of it along with the table's segment parameters (70 %); 2 findings"
     )
     assert light_of(beside, record.detection).title == "Large error, cause unknown; 2 findings"
     small = large.assign(target="1 fz", parameter="amplitude")

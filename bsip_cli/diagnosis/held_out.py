@@ -136,15 +136,20 @@ def unevenness(fit: Fitted, number: int, inflation: np.ndarray) -> float:
     """
     one = fit.faults[number]
     pulls, grams, shared = [], [], []
+    pairs = zip(fit.pieces, inflation.tolist(), strict=True)
+    # the likeliest coefficients where trials count so: with others the blocks' pulls do not agree
+    less = [Equations(piece.used, piece.gram / x, piece.against / x) for piece, x in pairs]
+    posterior = solved(less, fit.root)
     for t, trial in zip(one.trials, one.in_trials, strict=True):
         piece, block = fit.pieces[t], trial.blocks
         mine = block[:, None, None] == np.arange(block.max() + 1)
         change = one.columns(t)[0][..., one.is_free] @ (one.values / one.typical)[one.is_free]
         white = piece.noise.white(np.where(mine, change[..., None], 0.0))
-        pulls.append(white.T @ piece.left(fit.mean) / inflation[t])
-        alone, together = (x @ (piece.white.T @ white) for x in fit.solution.roots(t))
-        grams.append((white.T @ white - alone.T @ alone) / inflation[t])
-        shared.append(together / np.sqrt(inflation[t]))
+        counted = white / inflation[t]
+        pulls.append(counted.T @ piece.left(posterior.mean))
+        alone, together = (x @ (piece.white.T @ counted) for x in posterior.roots(t))
+        grams.append(white.T @ counted - alone.T @ alone)
+        shared.append(together)
     taken = np.concatenate(shared, axis=1)
     gram, pull = block_diag(*grams) - taken.T @ taken, np.concatenate(pulls)
     within: list[float] = []  # logarithms of the Bayes factors of a step in each trial

@@ -175,6 +175,17 @@ def test_plates_that_are_moved_in_the_middle_of_two_trials_are_uneven(seed):
     assert moved_from(4.9) > 5
 
 
+@pytest.mark.parametrize("target, size_n", [("1 fz", 40.0), ("1 fx", 15.0)])
+def test_a_zero_is_even_however_much_less_one_trial_counts(target, size_n):
+    """What several trials share is weighed as the trials are; else 40 N of each was uneven."""
+    zero, size = EFFECTS["plate_zero"], np.array([size_n])
+    trials = (movement(1), movement(11, 8.0))
+    both = session(*(shown(x, zero.change(x, target, size)) for x in trials))
+    fit = corrected(fitted(both, [Hypothesis(zero, target, (0, 1), size, both)]))
+    for inflation in ([1.0, 1.0], [1.0, 4.0], [4.0, 1.0]):
+        assert unevenness(fit, 0, np.array(inflation)) < 0
+
+
 def test_what_is_uneven_and_moves_another_fault_is_neither(monkeypatch):
     """A drift takes a delay out of its interval, a plate's zero does not; both are said to be of
     another size in every second."""

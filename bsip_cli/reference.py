@@ -291,8 +291,6 @@ def _facts(stage: Stage) -> str:
     facts = [("Reads", _links(stage.reads) or "the recording")]
     if stage.reads_if_there:
         facts.append(("where there are any", _links(stage.reads_if_there)))
-    if stage.options:
-        facts.append(("options", _code(stage.options)))
     return "; ".join(f"{name}: {what}" for name, what in facts) + "."
 
 

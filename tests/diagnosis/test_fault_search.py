@@ -186,6 +186,15 @@ def test_a_zero_is_even_however_much_less_one_trial_counts(target, size_n):
         assert unevenness(fit, 0, np.array(inflation)) < 0
 
 
+def test_a_drift_of_all_trials_is_one_fault_with_its_size():
+    drift, trials = EFFECTS["plate_drift"], (movement(1), movement(11, 8.0))
+    scenes = [shown(x, drift.change(x, "1 fz", np.array([1.5]))) for x in trials]
+    (one,) = told(found_in(*scenes, asked=(*ASKED, drift)))
+    assert (one.effect, one.target, one.trials) == ("plate_drift", "1 fz", ("a", "b"))
+    (rate,) = one.numbers
+    assert one.verdict == "named" and rate.low < 1.5 < rate.high < 1.7
+
+
 def test_what_is_uneven_and_moves_another_fault_is_neither(monkeypatch):
     """A drift takes a delay out of its interval, a plate's zero does not; both are said to be of
     another size in every second."""

@@ -58,10 +58,10 @@ def plates_called(name: str) -> str:
     return "all plates" if name == ALL else f"plate {name}"
 
 
-def in_channel(plate: Plate, channel: int, signal: np.ndarray) -> np.ndarray:
-    """(N, 6) wrench about the world's origin of a signal (N,) that one channel shows."""
-    reading = np.zeros((len(plate.wrench), 6))
-    reading[:, channel] = signal
+def in_channels(plate: Plate, amounts: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """(N, 6) wrench about the world's origin where each channel shows so much (6,) of a signal
+    (N,)."""
+    reading = signal[:, None] * amounts
     force, moment = (part @ plate.axes() for part in np.hsplit(reading, 2))
     return np.hstack([force, moment + np.cross(plate.moments_about_m(), force)])
 
@@ -101,23 +101,65 @@ class OfPlates(Effect):
         return known
 
 
-class OwnSignal(OfPlates):
-    """A channel of one plate shows a signal too much, whatever it measures, but where software has
-    written zeros since."""
+_ASIDE_M = 0.15  # of any place on a plate of 0.4 by 0.6 m from its middle: standard deviation
+_FARTHEST_M = 0.5
+# moments of a force in a channel about a middle that is not known
+_TURNS_ABOUT = {"fx": ("mz",), "fy": ("mz",), "fz": ("mx", "my")}
+
+
+class OfAChannel(OfPlates):
+    """A channel shows so much of a signal.
+
+    Its force acts in the plate's middle. Where the file does not say where that is, its moments are
+    numbers more: nobody reads them, but a misplaced middle is not taken for another fault.
+    """
+
+    @abstractmethod
+    def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
+        """(N,) for a size of one."""
+
+    def share(self, size: float) -> float:
+        """Of the signal, in what the channel shows."""
+        return size
+
+    def size(self, scene: Scene, target: str) -> Parameter:
+        """What a person reads."""
+        return self.numbers[0]
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        size = self.size(scene, target)
+        most, typical = _FARTHEST_M * size.most, _ASIDE_M * size.typical
+        unit = "m" if size.unit == "1" else size.unit.replace("N", "N m")
+        names = (f"{size.name}_{one}" for one in self._turning(scene, target))
+        return (size, *(Parameter(name, unit, -most, most, typical) for name in names))
+
+    def _turning(self, scene: Scene, target: str) -> tuple[str, ...]:
+        name, channel = target.split(" ")
+        placed = all(plate.is_placed for plate in plates_of(scene, name))
+        return () if placed else _TURNS_ABOUT.get(channel[-2:], ())
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        (name, channel), amounts = target.split(" "), np.zeros(6)
+        shown_in = (channel[-2:], *self._turning(scene, target))
+        amounts[[CHANNELS.index(one) for one in shown_in]] = self.share(values[0]), *values[1:]
+        plates = plates_of(scene, name)
+        return np.sum(
+            [in_channels(p, amounts, self.signal(scene, p, channel)) for p in plates], axis=0
+        )
+
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        return super().reported(scene, target, values)[:1]
+
+
+class OwnSignal(OfAChannel):
+    """Whatever the channel of one plate measures, but where software has written zeros since."""
 
     channels = CHANNELS
     of_all = False
 
-    def signal(self, scene: Scene) -> np.ndarray:
-        """(N,) for a size of one."""
-        return np.ones(len(scene.times_s))
-
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        name, channel = target.split(" ")
-        (plate,), signal = plates_of(scene, name), values[0] * self.signal(scene)
-        if plate.silent is not None:
-            signal = np.where(plate.silent, 0.0, signal)
-        return in_channel(plate, CHANNELS.index(channel), signal)
+    def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
+        shows = np.ones(len(scene.times_s))
+        return shows if plate.silent is None else np.where(plate.silent, 0.0, shows)
 
 
 class PlateZero(OwnSignal):
@@ -127,10 +169,10 @@ class PlateZero(OwnSignal):
         (plate,) = plates_of(scene, target.split(" ")[0])
         return not plate.zeroed
 
-    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+    def size(self, scene: Scene, target: str) -> Parameter:
         unit = unit_of(target.split(" ")[1])
         bounds = (-200.0, 200.0, 10.0) if unit == "N" else (-100.0, 100.0, 5.0)
-        return (Parameter("offset", unit, *bounds),)
+        return Parameter("offset", unit, *bounds)
 
 
 class PlateDrift(OwnSignal):
@@ -139,16 +181,16 @@ class PlateDrift(OwnSignal):
     Linear, zero where the trial begins.
     """
 
-    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+    def size(self, scene: Scene, target: str) -> Parameter:
         unit, duration = unit_of(target.split(" ")[1]), float(np.ptp(scene.times_s))
         most, typical = (20.0, 15.0) if unit == "N" else (10.0, 7.0)
-        return (Parameter("drift", f"{unit}/s", -most, most, typical / duration),)
+        return Parameter("drift", f"{unit}/s", -most, most, typical / duration)
 
-    def signal(self, scene: Scene) -> np.ndarray:
-        return scene.times_s - scene.times_s[0]
+    def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
+        return super().signal(scene, plate, channel) * (scene.times_s - scene.times_s[0])
 
 
-class PlateGain(OfPlates):
+class PlateGain(OfAChannel):
     """Force plates whose forces are scaled wrongly.
 
     One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth.
@@ -156,14 +198,14 @@ class PlateGain(OfPlates):
 
     channels = CHANNELS[:3]
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        name, channel = target.split(" ")
-        share, k = values[0] / (1 + values[0]), CHANNELS.index(channel)
-        parts = [in_channel(p, k, share * shown(p, k)) for p in plates_of(scene, name)]
-        return np.sum(parts, axis=0)
+    def share(self, size: float) -> float:
+        return size / (1 + size)
+
+    def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
+        return shown(plate, CHANNELS.index(channel))
 
 
-class PlateCrosstalk(OfPlates):
+class PlateCrosstalk(OfAChannel):
     """A channel of a force plate that leaks into another.
 
     A force channel also shows a part of another one, in one plate or, with the same amplifiers
@@ -172,11 +214,8 @@ class PlateCrosstalk(OfPlates):
 
     channels = tuple(f"{a}>{b}" for a, b in permutations(CHANNELS[:3], 2))
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        name, pair = target.split(" ")
-        source, sink = (CHANNELS.index(c) for c in pair.split(">"))
-        leaks = [in_channel(p, sink, shown(p, source)) for p in plates_of(scene, name)]
-        return values[0] * np.sum(leaks, axis=0)
+    def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
+        return shown(plate, CHANNELS.index(channel[:2]))
 
 
 class PlateRotation(OfPlates):

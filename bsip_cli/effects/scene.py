@@ -44,6 +44,7 @@ class Plate:
     sensor_m : (3,) the point that its moments are about; the middle of its surface if unknown.
     zeroed : whether what it read without load in this trial has been taken off.
     silent : (N,) where the file has 0 in all six, as software writes it for a plate without load.
+    is_placed : whether the file says where it lies; else its middle is where it bears on average.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Plate:
     sensor_m: np.ndarray | None = None
     zeroed: bool = False
     silent: np.ndarray | None = None
+    is_placed: bool = True
 
     def centre_m(self) -> np.ndarray:
         """(3,) middle of the surface."""

@@ -86,14 +86,14 @@ def plates_of(corners: pd.DataFrame, readings: Mapping[str, np.ndarray]) -> tupl
     """Every plate that has a reading (N, 6); where a file states no place, about its mean load."""
     found = []
     for name, reading in readings.items():
-        place = outline(corners, name)
+        stated = place = outline(corners, name)
         loaded = np.nan_to_num(reading[:, 2]) > _LOADED_N
         if place is None and loaded.any():  # a square in the lab's axes about the mean load
             force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
             middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
             place = middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
         if place is not None:
-            found.append(Plate(name, place, reading))
+            found.append(Plate(name, place, reading, is_placed=stated is not None))
     return tuple(found)
 
 

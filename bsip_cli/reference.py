@@ -290,7 +290,7 @@ def artifacts_page() -> str:
 def _facts(stage: Stage) -> str:
     facts = [("Reads", _links(stage.reads) or "the recording")]
     if stage.reads_if_there:
-        facts.append(("where there are any", _links(stage.reads_if_there)))
+        facts.append(("if there", _links(stage.reads_if_there)))
     return "; ".join(f"{name}: {what}" for name, what in facts) + "."
 
 

@@ -119,6 +119,33 @@ def test_crosstalk(source, sink):
     np.testing.assert_allclose(change, too_much, atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("effect", "target"),
+    [
+        (PlateZero(), "1 fx"),
+        (PlateZero(), "1 fy"),
+        (PlateZero(), "1 fz"),
+        (PlateDrift(), "1 fz"),
+        (PlateGain(), "1 fz"),
+        (PlateCrosstalk(), "1 fx>fy"),
+    ],
+)
+def test_of_a_plate_without_a_place_every_place_is_possible(effect, target):
+    """Moved along the floor by any distance, it is the same fault with other moments."""
+    scene = scene_with(lambda r: r)[0]
+    (plate,) = scene.plates
+    moved = replace(plate, sensor_m=plate.sensor_m + 0.12 * X - 0.2 * Y)
+    change = effect.change(replace(scene, plates=(moved,)), target, np.array([0.04]))
+    unplaced = replace(scene, plates=(replace(plate, is_placed=False),))
+    numbers = effect.parameters(unplaced, target)
+    assert len(numbers) == (3 if target.endswith("fz") else 2)
+    tangent = effect.tangent(unplaced, target, np.zeros(len(numbers)))
+    found, *_ = np.linalg.lstsq(tangent.reshape(-1, len(numbers)), change.ravel(), rcond=None)
+    np.testing.assert_allclose(tangent @ found, change, atol=1e-6 * np.abs(change).max())
+    assert found[0] == pytest.approx(0.04, rel=0.05)
+    assert len(effect.reported(unplaced, target, found)) == 1
+
+
 def test_an_offset_in_fz_makes_everybody_heavier():
     scene = scene_with(lambda r: r)[0]
     change = PlateZero().change(scene, "1 fz", np.array([9.80665]))

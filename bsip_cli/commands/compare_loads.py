@@ -28,6 +28,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
 from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import load_phi, loads_record, person_of
+from bsip_cli.statistics.samples import Z95
 from bsip_cli.study.study import Trial
 from bsip_cli.study.trials import listed
 
@@ -193,7 +194,6 @@ _EXPECTED = Column(("expected",), "To be expected")
 # --- what the parameters gain by the load ---------------------------------------------------------
 
 _SHORTEST_S = 0.5
-_Z95 = 1.96
 
 
 def _write(unit: Unit, sets: tuple[Sequence[Trial], Sequence[Trial]]) -> None:
@@ -271,7 +271,7 @@ class _Block:
     def _row(
         self, of: tuple[str, str, str], value: float, variance: float, declared: float, other: float
     ) -> _Line:
-        half = _Z95 * np.sqrt(variance)
+        half = Z95 * np.sqrt(variance)
         return self.analysis, *of, value, value - half, value + half, declared, other
 
     def rows(self, segments: Sequence[str]) -> Iterator[_Line]:
@@ -291,7 +291,7 @@ class _Block:
         for k, segment in enumerate(segments):
             own = slice(10 * k, 10 * k + 10)
             phi, covariance, declared = self.phi[own], self.covariance[own, own], self.declared[own]
-            if abs(phi[0]) <= _Z95 * np.sqrt(covariance[0, 0]) or declared[0] == 0:
+            if abs(phi[0]) <= Z95 * np.sqrt(covariance[0, 0]) or declared[0] == 0:
                 continue
             jacobian = readable_jacobian(phi)[1:4]
             spread = np.diag(jacobian @ covariance @ jacobian.T)

@@ -9,6 +9,7 @@ with named ones; what an error goes along with is said.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
@@ -134,9 +135,9 @@ ALONG = {
 class OfComponents(Nameless):
     """Errors of one component, which are said as they are, or of all, as a force and a moment."""
 
+    @abstractmethod
     def sizes(self, scene: Scene, target: str, values: np.ndarray) -> dict[str, float]:
         """Of each of its components [N, N m]."""
-        raise NotImplementedError
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         sizes = self.sizes(scene, target, values)

@@ -105,18 +105,29 @@ def test_errors_of_one_channel_whatever_the_simulation_is(channel):
         np.testing.assert_allclose(change, too_much, atol=1e-8, err_msg=effect.name)
 
 
-@pytest.mark.parametrize(("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz")])
+@pytest.mark.parametrize(
+    ("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz"), ("fz", "mz")]
+)
 def test_crosstalk(source, sink):
-    names = ("fx", "fy", "fz")
-
     def spoil(reading):
         spoilt = reading.copy()
-        spoilt[:, names.index(sink)] += 0.03 * reading[:, names.index(source)]
+        spoilt[:, CHANNELS.index(sink)] += 0.012 * reading[:, CHANNELS.index(source)]
         return spoilt
 
     scene, too_much = scene_with(spoil)
-    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.03]))
+    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.012]))
     np.testing.assert_allclose(change, too_much, atol=1e-8)
+
+
+def test_what_leaks_into_a_moment_is_a_length():
+    scene, values = moving(), np.array([0.012])
+    said = PlateCrosstalk().words(scene, "1 fz>mz", values).what
+    assert (
+        said
+        == "the moment about the vertical of plate 1 also shows the vertical force times +12.0 mm"
+    )
+    (number,) = PlateCrosstalk().parameters(scene, "1 fz>mz")
+    assert number.unit == "m" and number.typical == 0.25 * PlateCrosstalk.numbers[0].typical
 
 
 @pytest.mark.parametrize(
@@ -144,6 +155,9 @@ def test_of_a_plate_without_a_place_every_place_is_possible(effect, target):
     np.testing.assert_allclose(tangent @ found, change, atol=1e-6 * np.abs(change).max())
     assert found[0] == pytest.approx(0.04, rel=0.05)
     assert len(effect.reported(unplaced, target, found)) == 1
+    assert effect.possible(unplaced, target, found)
+    far = np.full(len(found), numbers[0].typical)  # of a middle one metre aside
+    assert not effect.possible(unplaced, target, far)
 
 
 def test_an_offset_in_fz_makes_everybody_heavier():

@@ -114,7 +114,7 @@ class OfAChannel(OfPlates):
     """A channel shows so much of a signal.
 
     Its force acts in the plate's middle. Where the file does not say where that is, its moments are
-    numbers more: nobody reads them, but a misplaced middle is not taken for another fault.
+    numbers more: a misplaced middle is not taken for another fault.
     """
 
     @abstractmethod
@@ -133,12 +133,13 @@ class OfAChannel(OfPlates):
         size = self.size(scene, target)
         most, typical = _FARTHEST_M * size.most, _ASIDE_M * size.typical
         unit = "m" if size.unit == "1" else size.unit.replace("N", "N m")
-        names = (f"{size.name}_{one}" for one in self._turning(scene, target))
+        names = (f"{size.name}_{one[-1]}" for one in self._turning(scene, target))
         return (size, *(Parameter(name, unit, -most, most, typical) for name in names))
 
     def _turning(self, scene: Scene, target: str) -> tuple[str, ...]:
         name, channel = target.split(" ")
-        placed = all(plate.is_placed for plate in plates_of(scene, name))
+        # what a laboratory says of its plates is of no trial
+        placed = scene is None or all(plate.is_placed for plate in plates_of(scene, name))
         return () if placed else _TURNS_ABOUT.get(channel[-2:], ())
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -156,9 +157,6 @@ class OfAChannel(OfPlates):
         least = 0.1 * self.size(scene, target).typical
         near = all(one < _FARTHEST_M * (size + least) for one in moments)
         return near and super().possible(scene, target, values)
-
-    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
-        return super().reported(scene, target, values)[:1]
 
 
 class OwnSignal(OfAChannel):

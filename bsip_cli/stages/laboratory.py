@@ -260,9 +260,10 @@ def _words(found: laboratory_search.Verdict) -> str:
     numbers = tuple(
         Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in found.sizes
     )
-    values = np.array([one.value for one in numbers])
-    words = _effect(found.cause).words(_NO_SCENE, found.cause.target, values)
-    return words.what + interval_words(numbers)
+    effect, target = _effect(found.cause), found.cause.target
+    said = len(effect.parameters(_NO_SCENE, target))  # without parts that need a trial
+    values = np.array([one.value for one in numbers[:said]])
+    return effect.words(_NO_SCENE, target, values).what + interval_words(numbers)
 
 
 def _sentence(found: laboratory_search.Verdict, counts: tuple[int, int]) -> str:

@@ -35,6 +35,8 @@ MASS_SHARE_SD = 0.15
 # segment's markers sit at one of its ends or in its middle, its centre at 0.35 to 0.6 of it.
 PLACE_SD = 0.2
 DELAY_SD_S = 0.003  # between plates and cameras, filters included
+# Forces that do not go with the motion may be late; by 0.05 s and more they are moved before.
+DELAYS_S = np.linspace(-0.05, 0.05, 21)
 ZERO_SD_N = 2.0  # of all plates together, after their zero is taken off
 STILL_SD_M_S = 0.006  # heart, breath, and noise of markers in quiet stance
 SOFT_SD = 0.15  # soft tissue and the rest, of the spread of the segments' velocities
@@ -245,12 +247,30 @@ def intervals_alone(
 def _stretch(
     force_z_N: np.ndarray, motion: SegmentMotion, first: int, last: int, rate_hz: float
 ) -> Interval | None:
+    """As the clocks say, or else as late as it goes with the motion best."""
+    found = _delayed(force_z_N, motion, first, last, rate_hz, 0.0)
+    if found is None or found.steadiness < COMES_AND_GOES:
+        return found
+    shifted = (_delayed(force_z_N, motion, first, last, rate_hz, x) for x in DELAYS_S)
+    return min((x for x in shifted if x is not None), key=lambda x: x.steadiness, default=found)
+
+
+def _delayed(
+    force_z_N: np.ndarray,
+    motion: SegmentMotion,
+    first: int,
+    last: int,
+    rate_hz: float,
+    late_s: float,
+) -> Interval | None:
+    """With forces that come so late."""
     seconds = (last - first) / rate_hz
     count = max(1, round(seconds / NODE_S))
     nodes = np.unique(np.round(np.linspace(first, last, count + 1)).astype(int))
-    steps = (force_z_N[first:last] + force_z_N[first + 1 : last + 1]) / 2 / rate_hz
+    known_N = np.nan_to_num(force_z_N)  # all of it between the nodes, unless they are moved
+    steps = (known_N[:-1] + known_N[1:]) / 2 / rate_hz
     total = np.concatenate([[0.0], np.cumsum(steps)])
-    impulse = np.diff(total[nodes - first])
+    impulse = np.diff(np.interp(nodes + late_s * rate_hz, np.arange(len(total)), total))
     if impulse.sum() / seconds < LEAST_MEAN_N:
         return None
     time = np.diff(nodes) / rate_hz

@@ -58,10 +58,12 @@ def told(
     size_m: float = 0.0,
     borne_N: np.ndarray | float = 0.0,
     ahead_m: float = 0.0,
+    late_s: float = 0.0,
 ) -> tuple[Interval, ...]:
-    """Stretches of a trial in which something else bears ``borne_N``."""
+    """Stretches of a trial in which something else bears ``borne_N``, its forces ``late_s``."""
     path, acceleration = rise(seconds, size_m)
-    force = mass_kg * (GRAVITY_M_S2 + acceleration) - borne_N
+    t = np.arange(len(path)) / RATE_HZ
+    force = mass_kg * (GRAVITY_M_S2 + np.interp(t - late_s, t, acceleration)) - borne_N
     noise = np.random.default_rng(1).normal(0.0, 1.0, len(force))
     everywhere = np.ones(len(force), bool)
     return intervals_of(markers(path, ahead_m), force + noise, everywhere, RATE_HZ)
@@ -80,6 +82,14 @@ def mass_of(*trials: tuple[Interval, ...], **more):
 @pytest.mark.parametrize("seconds", [0.7, 1.3, 7.0])
 def test_standing_and_bouncing_tell_the_mass(size_m, seconds):
     found = mass_of(told(62.0, seconds, size_m))
+    assert found.mass_kg == pytest.approx(62.0, rel=0.01)
+    assert abs(found.mass_kg - 62.0) < 0.01 * found.half_width_percent * 62.0
+
+
+@pytest.mark.parametrize("late_s", [-0.03, 0.012, 0.025, 0.04])
+@pytest.mark.parametrize("seconds", [2.2, 6.5])
+def test_late_forces_tell_the_mass_all_the_same(late_s, seconds):
+    found = mass_of(told(62.0, seconds, 0.1, late_s=late_s))
     assert found.mass_kg == pytest.approx(62.0, rel=0.01)
     assert abs(found.mass_kg - 62.0) < 0.01 * found.half_width_percent * 62.0
 

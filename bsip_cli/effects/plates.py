@@ -158,6 +158,10 @@ class OfAChannel(OfPlates):
         near = all(one < _FARTHEST_M * (size + least) for one in moments)
         return near and super().possible(scene, target, values)
 
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        """The size alone."""
+        return super().reported(scene, target, values)[:1]
+
 
 class OwnSignal(OfAChannel):
     """Whatever the channel of one plate measures, but where software has written zeros since."""

@@ -154,6 +154,7 @@ def test_of_a_plate_without_a_place_every_place_is_possible(effect, target):
     found, *_ = np.linalg.lstsq(tangent.reshape(-1, len(numbers)), change.ravel(), rcond=None)
     np.testing.assert_allclose(tangent @ found, change, atol=1e-6 * np.abs(change).max())
     assert found[0] == pytest.approx(0.04, rel=0.05)
+    assert len(effect.reported(unplaced, target, found)) == 1
     assert effect.possible(unplaced, target, found)
     far = np.full(len(found), numbers[0].typical)  # of a middle one metre aside
     assert not effect.possible(unplaced, target, far)

@@ -141,35 +141,20 @@ def _unnamed(fit: Fitted) -> Fitted:
 
 
 def _judged(
-    library: Library, fit: Fitted, named_from: float, known: int, refuted: Collection[Where]
+    library: Library, fit: Fitted, named_from: float, known: int, refuted: frozenset[Where]
 ) -> tuple[Fitted, tuple[Verdict, ...]]:
-    """Each fault given the others; one that is likelier absent goes, the least likely first, and
-    one that is likelier another becomes that: the others were found beside the wrong one."""
-    seen = set()
+    """Each fault given the others, no two by one name; one that is likelier absent goes, the least
+    likely first."""
     while True:
-        seen.add(frozenset(map(_place_of, fit.faults)))
         inflation = scores_of(library, fit).inflation
-        numbers = range(known, len(fit.faults))
-        found = [_verdict(library, fit, k, named_from, inflation, refuted) for k in numbers]
+        found: list[tuple[Verdict, Fitted]] = []
+        for k in range(known, len(fit.faults)):
+            called = {_place_of(one.members[0][0].fault) for one, _ in found}
+            found.append(_verdict(library, fit, k, named_from, inflation, refuted | called))
         weakest = min(found, key=lambda one: one[0].probability, default=None)
-        if weakest is not None and weakest[0].probability <= 0.5:
-            _, fit = weakest
-            continue
-        verdicts = tuple(verdict for verdict, _ in found)
-        others = (_with_likeliest(fit, one) for one in verdicts)
-        new = (x for x in others if frozenset(map(_place_of, x)) not in seen)
-        if (faults := next(new, None)) is None or len(seen) > _MOST:
-            return fit, verdicts
-        fit = corrected(fitted(library.session, faults, start=fit))
-
-
-def _with_likeliest(fit: Fitted, verdict: Verdict) -> Sequence[Hypothesis]:
-    """All faults, in the place of a verdict's what it is likelier to be, if that has a name."""
-    likeliest, _ = verdict.members[0]
-    if likeliest.fault.name == UNEXPLAINED:
-        return fit.faults
-    others = (one for k, one in enumerate(fit.faults) if k != verdict.number)
-    return (*others, likeliest.fault)
+        if weakest is None or weakest[0].probability > 0.5:
+            return fit, tuple(verdict for verdict, _ in found)
+        fit = corrected(weakest[1])
 
 
 def _verdict(

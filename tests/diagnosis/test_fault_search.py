@@ -12,7 +12,7 @@ import pytest
 from bsip_cli.diagnosis import fault_search
 from bsip_cli.diagnosis.fault_model import Hypothesis, corrected, fitted
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of, smallest
-from bsip_cli.diagnosis.fault_search import Found, Tried, search
+from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out, unevenness
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
@@ -193,20 +193,6 @@ def test_a_drift_of_all_trials_is_one_fault_with_its_size():
     assert (one.effect, one.target, one.trials) == ("plate_drift", "1 fz", ("a", "b"))
     (rate,) = one.numbers
     assert one.verdict == "named" and rate.low < 1.5 < rate.high < 1.7
-
-
-def test_what_was_found_as_another_fault_becomes_what_it_is(monkeypatch):
-    """A clock that runs otherwise is found where forces come late; the rest is judged beside the
-    delay."""
-    both = session(late(movement(1), 0.02), late(movement(11, 8.0), 0.02))
-    library = library_of(both, (*ASKED, EFFECTS["clock_drift"]), (0, 1), ODDS)
-    wrong = Hypothesis(EFFECTS["clock_drift"], "", (0, 1), np.array([0.001]), both)
-    first = iter([[Tried(corrected(fitted(both, [wrong])), 0.0, 100.0)]])
-    monkeypatch.setattr(fault_search, "one_round", lambda *_: next(first, []))
-    found = search(library, NAMED_FROM)
-    (one,) = found.fit.faults
-    assert one.name == "sync_offset" and one.values[0] == pytest.approx(0.02, abs=0.002)
-    assert [x.members[0][0].fault.name for x in found.verdicts] == ["sync_offset"]
 
 
 def test_what_is_uneven_and_moves_another_fault_is_neither(monkeypatch):

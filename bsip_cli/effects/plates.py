@@ -7,7 +7,6 @@ stands reads a positive fz, and an offset of +10 N in fz makes everybody seem 1 
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
 from itertools import permutations
 from typing import Any, ClassVar
 
@@ -104,8 +103,6 @@ class OfPlates(Effect):
 
 _ASIDE_M = 0.15  # of any place on a plate of 0.4 by 0.6 m from its middle: standard deviation
 _FARTHEST_M = 0.5
-_EDGE_M = 0.25  # from its middle to its edges: full scale of a moment over that of a force
-_TO_A_MOMENT = "fz>mz"
 # moments of a force in a channel about a middle that is not known
 _TURNS_ABOUT = {"fx": ("mz",), "fy": ("mz",), "fz": ("mx", "my")}
 
@@ -221,27 +218,10 @@ class PlateCrosstalk(OfAChannel):
     """A channel of a force plate that leaks into another.
 
     A force channel also shows a part of another one, in one plate or, with the same amplifiers
-    and no calibration, in all. So may the moment about the vertical; about the other axes the
-    vertical force makes the moments of a plate that lies elsewhere.
+    and no calibration, in all.
     """
 
-    channels = (*(f"{a}>{b}" for a, b in permutations(CHANNELS[:3], 2)), _TO_A_MOMENT)
-
-    def size(self, scene: Scene, target: str) -> Parameter:
-        (leaks,) = self.numbers
-        if not target.endswith(_TO_A_MOMENT):
-            return leaks
-        most, typical = _EDGE_M * leaks.most, _EDGE_M * leaks.typical
-        return replace(leaks, unit="m", least=-most, most=most, typical=typical)
-
-    def words(self, scene: Scene, target: str, values: np.ndarray) -> Words:
-        if not target.endswith(_TO_A_MOMENT):
-            return super().words(scene, target, values)
-        return Words(
-            "{other} of {plates} also shows {channel} times {coefficient:+.1f} mm".format(
-                **self.spoken(scene, target, values)
-            )
-        )
+    channels = tuple(f"{a}>{b}" for a, b in permutations(CHANNELS[:3], 2))
 
     def signal(self, scene: Scene, plate: Plate, channel: str) -> np.ndarray:
         return shown(plate, CHANNELS.index(channel[:2]))

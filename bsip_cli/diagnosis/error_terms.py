@@ -121,7 +121,8 @@ def error_terms(
         for target in effect.targets(scene):  # each place, as far as every laboratory has it
             null = np.zeros(len(effect.parameters(source, target)))
             wrench = SHARE * effect.signature(source, target, null)
-            yield Term(name, target, f"{name} {target}", own, wrench)
+            numbers = f"{len(null)} numbers"  # a file that places its plates has fewer
+            yield Term(name, target, f"{name} {target}, {numbers}", own, wrench)
 
 
 def as_simulated(scene: Scene) -> Scene:

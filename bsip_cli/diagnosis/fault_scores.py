@@ -178,8 +178,18 @@ def _places(
         asked = alone if effect.while_moving else range(len(parts))
         held_in = (t for t in asked if candidate in parts[t])
         holding = tuple(t for t in held_in if effect.is_shared_at(scenes[t], target))
+        holding = alike_in(effect, target, scenes, holding)
         if effect.is_shared and len(holding) > 1:
             yield Place(candidate, holding)
+
+
+def alike_in(
+    effect: Effect, target: str, scenes: Sequence[Scene], trials: Sequence[int]
+) -> tuple[int, ...]:
+    """Of these trials those in which a fault has the numbers that it has in the first: a file that
+    does not say where its plates lie has more."""
+    names = [tuple(p.name for p in effect.parameters(scenes[t], target)) for t in trials]
+    return tuple(t for t, mine in zip(trials, names, strict=True) if mine == names[0])
 
 
 @dataclass(frozen=True, eq=False)

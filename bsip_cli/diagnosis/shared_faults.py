@@ -19,6 +19,7 @@ from scipy.ndimage import binary_erosion
 from bsip_cli.diagnosis.error_model import Session, TrialErrors, session_of
 from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated
 from bsip_cli.diagnosis.fault_model import Hypothesis, fitted
+from bsip_cli.diagnosis.fault_scores import alike_in
 from bsip_cli.diagnosis.normal_equations import summed
 from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -114,6 +115,8 @@ def _hypotheses(session: Session, standing: Sequence[bool]) -> Iterator[Hypothes
             if target.split(" ")[0] == ALL:
                 continue
             holding = [t for t, mine in enumerate(targets) if target in mine]
+            scenes = [one.scene for one in session.trials]
+            holding = [*alike_in(effect, target, scenes, holding)]
             separate = [[t for t in holding if standing[t] == stands] for stands in (False, True)]
             for trials in [holding] if effect is STATED_MASS else filter(None, separate):
                 count = len(effect.parameters(session.trials[trials[0]].scene, target))
@@ -143,10 +146,11 @@ def with_known(
         for target in shared_targets(effect, trial.scene):
             parameters = effect.parameters(trial.scene, target)
             mine = [Coordinate(effect.name, target, p.name, standing) for p in parameters]
-            if mine[0] in coordinates:
-                at = [coordinates.index(one) for one in mine]
+            if mine[0] in coordinates:  # of a plate's middle other files may say less
+                here = [k for k, one in enumerate(mine) if one in coordinates]
+                at = [coordinates.index(mine[k]) for k in here]
                 slope = effect.signature(scene, target, np.zeros(len(parameters)))
-                columns[..., at] = trial.filter(slope)
+                columns[..., at] = trial.filter(slope[..., here])
     name = f"{FAULT}laboratory"
     term = Term(name, "", name, False, columns, mixing=root)
     residual = trial.residual - columns @ mean

@@ -211,7 +211,7 @@ def about_place(name: str, found: str, action: str, level: str) -> Finding:
 
 
 def _are_alike(before: Evidence, after: Evidence) -> bool:
-    """Whether both put the force at one place, to half a centimetre: not there is the fault."""
+    """Whether both put the force at one place, to half a centimetre: it was not wrong there."""
     one, other = ((x.distance_m, x.outside_m, x.sway_m) for x in (before, after))
     return bool(np.allclose(one, other, rtol=0.0, atol=0.005, equal_nan=True))
 

@@ -195,6 +195,13 @@ def test_a_drift_of_all_trials_is_one_fault_with_its_size():
     assert one.verdict == "named" and rate.low < 1.5 < rate.high < 1.7
 
 
+def test_files_that_say_where_plates_lie_and_others_are_searched_together():
+    first, second = late(movement(1), 0.012), late(movement(11, 8.0), 0.012)
+    unplaced = tuple(replace(one, is_placed=False) for one in second.plates)
+    found = told(found_in(first, replace(second, plates=unplaced)))
+    assert [(one.effect, one.trials) for one in found] == [("sync_offset", ("a", "b"))]
+
+
 def test_what_is_uneven_and_moves_another_fault_is_neither(monkeypatch):
     """A drift takes a delay out of its interval, a plate's zero does not; both are said to be of
     another size in every second."""

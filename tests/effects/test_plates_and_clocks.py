@@ -107,13 +107,15 @@ def test_errors_of_one_channel_whatever_the_simulation_is(channel):
 
 @pytest.mark.parametrize(("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz")])
 def test_crosstalk(source, sink):
+    names = ("fx", "fy", "fz")
+
     def spoil(reading):
         spoilt = reading.copy()
-        spoilt[:, CHANNELS.index(sink)] += 0.012 * reading[:, CHANNELS.index(source)]
+        spoilt[:, names.index(sink)] += 0.03 * reading[:, names.index(source)]
         return spoilt
 
     scene, too_much = scene_with(spoil)
-    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.012]))
+    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.03]))
     np.testing.assert_allclose(change, too_much, atol=1e-8)
 
 

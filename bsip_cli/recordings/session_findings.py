@@ -3,7 +3,7 @@ trial where it stands alone."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
 from bsip_cli.recordings.scene import crossed_limbs, handedness
 from bsip_cli.recordings.session_reading import AGAINST, SessionReading, Verdict
 from bsip_cli.recordings.shared_forces import ALIKE_M
+from bsip_cli.recordings.trial_samples import LEAST_S
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.written import Written, force_unit_words
 
@@ -67,7 +68,7 @@ def _about_written(written: Written) -> list[Finding]:
     return findings
 
 
-def _about_those_against(trials: tuple[str, ...]) -> list[Finding]:
+def _about_those_against(trials: Collection[str]) -> list[Finding]:
     """Of the forces that are believed although as many trials contradict them."""
     if not trials:
         return []
@@ -114,16 +115,16 @@ def other_pace(times: float, rate_hz: float) -> str:
 
 def about_delay(own_s: float, delays_s: Mapping[str, float]) -> list[Finding]:
     """Of the trial, or of another one: a quiet trial does not show it of itself."""
-    expected, level = "one clock of markers and forces", "corrected"
+    expected = "one clock of markers and forces"
     if own_s:
-        found = delay_words(own_s)
-        action = "moved them by that; start markers and forces by one signal to know it better, "
-        action += "and make sure that they are not those of another trial"
-        return [Finding("delay", "forces", found, expected, action, level)]
-    action = "none shows here, took the times as they stand; look whether the same delay is here "
-    action, level = f"{action}too", "warning"
-    said = [f"in {name} {delay_words(delay_s)}" for name, delay_s in delays_s.items()]
-    return [Finding("delay", "forces", found, expected, action, level) for found in said[:1]]
+        said = [delay_words(own_s)]
+        action = f"moved them by that, which is known to about {LEAST_S:g} s; start markers and "
+        action += "forces by one signal, and make sure that they are not those of another trial"
+    else:
+        said = [f"in {name} {delay_words(delay_s)}" for name, delay_s in delays_s.items()]
+        action = "none shows here, took the times as they stand; look whether the same delay is "
+        action += "here too"
+    return [Finding("delay", "forces", one, expected, action, "warning") for one in said[:1]]
 
 
 def about_drift(drift_s: float) -> list[Finding]:

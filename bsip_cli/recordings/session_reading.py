@@ -91,7 +91,7 @@ class SessionReading:
     it ran, where that is sure, or ``maybe_paces`` where the stated rate is not believed.
     ``of_others`` : by trial whose forces are another's, that one; ``twins`` : where both have them.
     ``odd`` : by trial that is not as all others are, in what: its "sides", its "forces", or the
-    unit of these; ``against`` : those of odd forces, where they are as many as all others.
+    unit of these; ``against`` : of odd forces, where those are as many as all others.
     ``moment_scales``, ``point_scales`` : by trial whose units are not the others'.
     ``written`` : what the files of all trials are read as.
     ``of_paces`` : how much better each of `PACES` would suit each trial.
@@ -106,7 +106,7 @@ class SessionReading:
     of_others: Mapping[str, str] = field(default_factory=dict)
     twins: Mapping[str, str] = field(default_factory=dict)
     odd: Mapping[str, str] = field(default_factory=dict)
-    against: tuple[str, ...] = ()
+    against: Mapping[str, str] = field(default_factory=dict)
     moment_scales: Mapping[str, float] = field(default_factory=dict)
     point_scales: Mapping[str, float] = field(default_factory=dict)
     written: Written = AS_WRITTEN
@@ -174,7 +174,7 @@ def reading_of_files(
     usual = Handedness.of_all([one.hands for one in trials]).sign or 1
     odd = _of_odd_units(trials, stated_m, gross_percent, limits)
     odd |= {one.name: "sides" for one in trials if one.hands.sign == -usual}
-    against: tuple[str, ...] = ()
+    against: dict[str, str] = {}
 
     def of_own_forces(written: Written = AS_WRITTEN) -> list[TrialSamples]:
         every = trials if written == AS_WRITTEN else read(written)
@@ -188,8 +188,9 @@ def reading_of_files(
         if settled := _of_own_units(own, alone, limits):
             found = replace(settled, written=found.written)
         elif names := _odd_trials(own, alone, limits):
-            odd |= dict.fromkeys(names, "forces")
-            against = tuple(names) if 2 * len(names) == len(alone) else ()
+            of_forces = dict.fromkeys(names, "forces")
+            odd |= of_forces
+            against = of_forces if 2 * len(names) == len(alone) else {}
             found = _reading_of_own(of_own_forces, *stated)
     return replace(found, of_others=of_others, twins=twins, odd=odd, against=against)
 

@@ -36,7 +36,7 @@ from bsip_cli.study.study import Trial
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
 _SCALES = ("moment_scales", "point_scales")
-_ODD = ("of_others", "twins", "odd")
+_ODD = ("of_others", "twins", "odd", "against")
 _OF_TRIALS = ("delays_s", "drifts_s", "paces", "maybe_paces", *_ODD, *_SCALES)
 NO_GAINS: Mapping[str, float] = {}
 _HALF = ("half_size_x_m", "half_size_y_m")
@@ -46,8 +46,7 @@ _NO_TEST = "what is found in one is no test of the other; remove one of them"
 def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     rows: list[dict[str, object]] = []
-    facts: dict[str, dict[str, float | str]] = {name: {} for name in _OF_TRIALS}
-    written: dict[str, dict[str, float]] = {name: {} for name in asdict(AS_WRITTEN)}
+    facts = facts_of(SessionReading(), [])
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     copies = _say_copies(unit, unit.person.trials)
@@ -77,10 +76,8 @@ def run(unit: Unit) -> None:
             read = partial(_surveyed, unit, mine, limits, gains=gains)
             reading = reading_of_files(read(), read, *stated, limits).with_gains(gains)
         rows += rows_of(session or "", reading)
-        for name, of_trials in facts.items():
-            of_trials |= getattr(reading, name)
-        for name, value in asdict(reading.written).items():
-            written[name] |= {one.name: value for one in seen if value != 1.0}
+        for name, of_trials in facts_of(reading, [one.name for one in seen]).items():
+            facts[name] |= of_trials
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
@@ -89,7 +86,7 @@ def run(unit: Unit) -> None:
             f"{again} has the forces of {first}, or of a part of it, and moves alike: one "
             f"recording exported twice, or one has the other's forces; {_NO_TEST}"
         )
-    unit.write("readings", rows, facts | written)
+    unit.write("readings", rows, facts)
 
 
 def _gains(unit: Unit, trials: Sequence[Trial], reading: SessionReading) -> dict[str, float]:
@@ -184,6 +181,15 @@ def rows_of(session: str, reading: SessionReading) -> list[dict[str, object]]:
     return [frame | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
 
 
+def facts_of(reading: SessionReading, trials: Sequence[str]) -> dict[str, dict[str, float | str]]:
+    """Of a session of these ``trials``: by name, and then by trial, what is not of a plate."""
+    written = {
+        name: dict.fromkeys(trials if value != 1.0 else [], value)
+        for name, value in asdict(reading.written).items()
+    }
+    return {name: dict(getattr(reading, name)) for name in _OF_TRIALS} | written
+
+
 def _row(verdict: Verdict) -> dict[str, object]:
     row, nothing = asdict(verdict.reading), float("nan")
     places = *(row.pop("centre_m") or [nothing] * 3), *(row.pop("half_size_m") or [nothing] * 2)
@@ -224,8 +230,9 @@ def reading_of(table: pd.DataFrame, facts: Mapping[str, Any], trial: Trial) -> S
     frame = FrameChange(**known, axis=axis, corners_only=is_of_corners)
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
     written = {name: facts[name].get(trial.stem, 1.0) for name in asdict(AS_WRITTEN)}
-    of_trials = {name: facts[name] for name in _OF_TRIALS}
     mine = trial.stem.partition("_task-")[0]  # person and session
-    delays_s = {k: s for k, s in of_trials["delays_s"].items() if k.partition("_task-")[0] == mine}
-    of_trials["delays_s"] = delays_s
+    of_trials: dict[str, Any] = {
+        name: {k: value for k, value in facts[name].items() if k.partition("_task-")[0] == mine}
+        for name in _OF_TRIALS
+    }
     return SessionReading(frame, plates, **of_trials, written=Written(**written))

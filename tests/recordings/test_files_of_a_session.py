@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bsip_cli.recordings.plate_reading import AS_STATED, Opened
@@ -25,6 +26,8 @@ from bsip_cli.recordings.written import (
     likely_paces,
     of_other_trials,
 )
+from bsip_cli.stages.survey import facts_of, reading_of, rows_of
+from bsip_cli.study.trials import Trial
 from tests.recordings.standing_on_two_plates import LABELS, motion, of_c3d, of_table, opened
 
 
@@ -129,6 +132,23 @@ def test_few_trials_that_are_otherwise_cost_the_others_nothing(sound, odd):
     doubts = [one for one in findings_about(found) if one.level == "warning"]
     assert len(doubts) == (len(odd) == sound)  # no majority
     assert all("in odd0" in one.found for one in doubts)
+
+
+@pytest.mark.parametrize("odd", [exchanged(of_c3d()), of_c3d(moment_scale=1e-3)])
+def test_what_is_decided_of_a_session_reaches_each_trial(odd):
+    """Through the survey's table and its facts, whose other session says nothing of this one."""
+    trials = [named(opened(x), f"sub-a_task-t{k}") for k, x in enumerate((of_c3d(), odd))]
+    trials.append(named(far_away(), "sub-a_task-far"))
+    names = [one.recording.path.stem for one in trials]
+    for some in (trials[:2], trials[:1] + trials[2:]):
+        found = reading(some)
+        table, facts = pd.DataFrame(rows_of("", found)), facts_of(found, names)
+        facts["against"] |= {"sub-b_task-t0": "forces"}
+        own = (Trial("sub-a", "t0", one, Path(one), "sequence") for one in names)
+        for one, trial in zip(trials, own, strict=True):
+            read = reading_of(table, facts, trial)
+            assert findings_about(read) == findings_about(found)
+            assert assemble(one, read).findings == assemble(one, found).findings
 
 
 @pytest.mark.parametrize(

@@ -308,23 +308,24 @@ def _reading_of_own(
             written = Written(force_N(name, stated_kg))
             trials = read(written)
     found = session_reading(trials, limits)
-    now, best = found.log_posterior, replace(found, written=written)
-    most = float(np.log(surely / (1 - surely)))
-    for pace, odds in likely_paces([one.lengths for one in trials]).items():
-        other = replace(written, pace=pace)
-        found = session_reading(read(other), limits)
-        if (gain := found.log_posterior + odds - now) > most:
-            best, most = replace(found, written=other), gain
-    if (pace := best.written.pace) == 1.0:
-        return best
+    best, most = (
+        replace(found, written=written),
+        found.log_posterior + float(np.log(surely / (1 - surely))),
+    )
     # Markers and forces last alike if the times of either are wrong; forces are as large as the
     # accelerations then if it is the right one.
-    of_forces = float(expit(log_odds_of(best.of_paces, 1 / pace)))
-    if of_forces >= surely:
-        other = replace(written, force_pace=1 / pace)
-        return replace(session_reading(read(other), limits), written=other)
-    doubted = replace(best.written, probability=1 - of_forces)
-    return best if 1 - of_forces >= surely else replace(best, written=doubted)
+    for pace, odds in likely_paces([one.lengths for one in trials]).items():
+        either = replace(written, pace=pace), replace(written, force_pace=1 / pace)
+        cameras, forces = (
+            replace(session_reading(read(one), limits), written=one) for one in either
+        )
+        if (log := max(cameras.log_posterior, forces.log_posterior) + odds) > most:
+            of_forces, most = float(expit(log_odds_of(cameras.of_paces, 1 / pace))), log
+            doubted = replace(
+                either[0], probability=1.0 if 1 - of_forces >= surely else 1 - of_forces
+            )
+            best = forces if of_forces >= surely else replace(cameras, written=doubted)
+    return best
 
 
 def session_reading(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:

@@ -54,7 +54,8 @@ def _about_written(written: Written) -> list[Finding]:
         action = f"read forces and moments {force_unit_words(written.force_N)}, in all trials; "
         action += "export them in N"
         findings.append(Finding("unit", "forces", found, expected, action, "corrected"))
-    for whose, pace in (("cameras", written.pace), ("forces", written.force_pace)):
+    rates = {"cameras": written.pace, "forces": written.force_pace}
+    for (whose, pace), other in zip(rates.items(), reversed(rates), strict=True):
         if pace != 1.0:
             lasting = pace if whose == "cameras" else 1 / pace
             found = f"the markers last {lasting:.4g} times as long as the forces"
@@ -63,7 +64,7 @@ def _about_written(written: Written) -> list[Finding]:
             action += "trials; correct it in the files"
             if written.probability < 1.0:
                 level = "warning"
-                action += f" (p = {written.probability:.2f}; else that of the forces is wrong)"
+                action += f" (p = {written.probability:.2f}; else that of the {other} is wrong)"
             findings.append(Finding("rate", whose, found, expected, action, level))
     return findings
 

@@ -307,24 +307,19 @@ def _reading_of_own(
         if name := force_unit(mass_kg, stated_kg, height_m, gross_percent, surely):
             written = Written(force_N(name, stated_kg))
             trials = read(written)
-    found = session_reading(trials, limits)
-    best, most = (
-        replace(found, written=written),
-        found.log_posterior + float(np.log(surely / (1 - surely))),
-    )
+    best = replace(session_reading(trials, limits), written=written)
+    most = best.log_posterior + float(np.log(surely / (1 - surely)))
     # Markers and forces last alike if the times of either are wrong; forces are as large as the
     # accelerations then if it is the right one.
     for pace, odds in likely_paces([one.lengths for one in trials]).items():
         either = replace(written, pace=pace), replace(written, force_pace=1 / pace)
-        cameras, forces = (
-            replace(session_reading(read(one), limits), written=one) for one in either
-        )
-        if (log := max(cameras.log_posterior, forces.log_posterior) + odds) > most:
-            of_forces, most = float(expit(log_odds_of(cameras.of_paces, 1 / pace))), log
-            doubted = replace(
-                either[0], probability=1.0 if 1 - of_forces >= surely else 1 - of_forces
-            )
-            best = forces if of_forces >= surely else replace(cameras, written=doubted)
+        found = [session_reading(read(one), limits) for one in either]
+        if (log := max(one.log_posterior for one in found) + odds) > most:
+            of_forces, most = float(expit(log_odds_of(found[0].of_paces, 1 / pace))), log
+            k = int(of_forces > 0.5)
+            share = max(of_forces, 1 - of_forces)
+            as_written = replace(either[k], probability=1.0 if share >= surely else share)
+            best = replace(found[k], written=as_written)
     return best
 
 

@@ -37,6 +37,7 @@ LOWEST_M = (-0.06, 0.17)
 """Where, over the surface, a foot's lowest marker is: computed ones err, some sets have ankles."""
 
 _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
+_ROUNDING_M = 1e-9
 _LITTLE_TORQUE_M = 3e-5  # below it the likelihood falls too: soles hardly make less
 _LEAN, _ASTRAY = 0.63, 0.18  # of the slope to the body, and half of all are so far from it
 _PLACE_M = 0.024  # the markers show where the body is, to this: see balance_median_m
@@ -227,7 +228,7 @@ def evidence(
     if lever_m is not None:
         table[5] = np.sqrt(_mean(lever_m[:, known] ** 2))
     table[6] = np.median(np.abs(torque) / load, axis=1)
-    table[6][table[6] == 0.0] = np.nan  # none is written
+    table[6][table[6] < _ROUNDING_M] = np.nan  # none is written
     if level_Nm is not None:
         read, written = (x[:, known] for x in level_Nm)
         table[7], table[8] = np.median(read / load, axis=1), _left_share(read, written, load)

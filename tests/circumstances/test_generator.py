@@ -15,6 +15,7 @@ from tests.circumstances.judge import (
     OUTCOMES,
     REPAIRED,
     RIGHT,
+    SAID,
     WRONG,
     WRONGLY_REPAIRED,
 )
@@ -55,6 +56,21 @@ def test_a_hundred_circumstances_keep_the_limits():
         of = sound if outcome == DISTURBED else changed
         assert share(of, outcome) <= limit, (outcome, table(judgements))
     assert share(can_be_mended(judgements), RIGHT, REPAIRED) >= RIGHT_OR_REPAIRED, table(judgements)
+
+
+@pytest.mark.long(minutes=1)
+@pytest.mark.parametrize(
+    ("seed", "number", "outcome"),
+    [
+        (1401, 19, SAID),  # forces of half of the trials are nobody's: said in the others too
+        (1402, 178, REPAIRED),  # the forces' rate, taken for a delay and a reversed channel
+        (1402, 36, REPAIRED),  # points in mm, and no moments
+        (1402, 105, REPAIRED),  # of two rates the likelier
+    ],
+)
+def test_draws_that_were_wrong_once(seed, number, outcome):
+    (judgement,) = examined(seed, [number])
+    assert judgement.outcome == outcome, judgement
 
 
 def test_the_same_seed_draws_the_same():

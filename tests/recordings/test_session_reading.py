@@ -192,6 +192,15 @@ def test_a_fault_of_all_plates_counts_once_beside_one_of_a_single_plate():
     assert prior_of(one) == pytest.approx(prior_of(now) + rare + ONE_ALONE)
 
 
+def test_a_table_without_moments_shows_no_torque():
+    """Though moments about the world's origin leave some by rounding."""
+    found = Hypothesis.as_stated(
+        FrameChange(), [TrialSamples.of(opened(of_table(moment_scale=0.0)))], USUAL
+    )
+    torque = [fit.evidence().torque_m for fit in found.fits.values()]
+    assert np.isnan(torque).all()
+
+
 def test_no_reading_is_tried_twice():
     trials = [TrialSamples.of(opened(of_c3d(moment_scale=1e-3)))]
     now = Hypothesis.as_stated(FrameChange(), trials, USUAL)

@@ -240,6 +240,7 @@ _CLEARLY_M = 5e-3  # the neighbours' way during a hold: more than soft tissue of
 _DIGITS = 5.0  # as many sizes of the last digit: a marker that is still moves within one
 _ITS_SHARE = 0.3  # of the neighbours' way: what it has to make up afterwards
 _FINE_M = 1e-5  # no camera's noise is smaller: a marker at rest does not repeat itself
+_MOSTLY = 0.5  # of the time
 _RARELY = 0.01  # of a marker's steps are none, outside the hold
 
 
@@ -314,8 +315,9 @@ def repeated_frames(markers_m: np.ndarray) -> np.ndarray:
 def held_markers(markers_m: np.ndarray) -> np.ndarray:
     """Which positions (n_frames, n_markers, 3) only repeat a marker's last one, bool.
 
-    A run of equal positions is a hold if the nearest other markers move on meanwhile, by clearly
-    more than the last digit, and the marker then jumps after them. At the end of a trial there is
+    A run of equal positions is a hold if the nearest other markers, or all where it lasts most of
+    the trial, move on meanwhile, by clearly more than the last digit, and the marker then jumps
+    after them. At the end of a trial there is
     no jump: there it counts where numbers are fine and the marker never repeats itself elsewhere.
     A foot on the ground in coarse numbers leaves its place by one digit, and is no hold.
     """
@@ -329,21 +331,31 @@ def held_markers(markers_m: np.ndarray) -> np.ndarray:
     digit_m = float(np.min(steps[steps > 0], initial=np.inf))  # the smallest step of a coordinate
     for marker in map(int, np.flatnonzero(same.any(axis=0))):
         still = runs(same[:, marker])
-        neighbours = markers_m[:, _nearest(markers_m, marker)]
+        nearest = _nearest(markers_m, marker)
         for start, stop in still[np.diff(still, axis=1)[:, 0] >= _LEAST_FRAMES - 1]:
-            last = min(stop, len(same) - 1)
-            ways = np.linalg.norm(neighbours[last] - neighbours[start - 1], axis=-1)
-            ways = ways[np.isfinite(ways)]
+            # Who is held all through has no neighbours: the body moves away from it.
+            is_long = stop - start > _MOSTLY * len(same)
+            others = same.mean(axis=0) < _MOSTLY if is_long else nearest
+            ways = _ways(markers_m[start - 1 : stop + 1, others])
             way = float(np.median(ways)) if len(ways) > 1 else float("nan")
             if not way > max(_CLEARLY_M, _DIGITS * digit_m):
                 continue
             if stop < len(same) and np.isfinite(markers_m[stop, marker]).all():
                 is_hold = _jumps(markers_m[:, marker], stop, way)
             else:
-                others = same[:, marker].sum() - (stop - start)
-                is_hold = digit_m < _FINE_M and others < _RARELY * len(same)
+                rest = same[:, marker].sum() - (stop - start)
+                is_hold = digit_m < _FINE_M and rest < _RARELY * len(same)
             held[start:stop, marker] = is_hold
     return held
+
+
+def _ways(markers_m: np.ndarray) -> np.ndarray:
+    """How far each marker (n_frames, k, 3) that is seen twice comes from where it is seen first to
+    where it is seen last, (up to k,)."""
+    seen = np.isfinite(markers_m).all(axis=-1)
+    some = np.flatnonzero(seen.sum(axis=0) > 1)
+    first, last = seen.argmax(axis=0), len(seen) - 1 - seen[::-1].argmax(axis=0)
+    return np.linalg.norm(markers_m[last[some], some] - markers_m[first[some], some], axis=-1)
 
 
 def _nearest(markers_m: np.ndarray, marker: int) -> np.ndarray:

@@ -196,16 +196,20 @@ def _judged(
             f"the plates measure {measured.mass_kg:.1f} kg to {measured.half_width_percent:.0f} % "
             f"only, in {seconds:.1f} s with all contacts on them"
         )
-    low, high = (LEAST_KG, MOST_KG) if height_m is None else np.array(BMI_KG_M2) * height_m**2
-    if not low <= measured.mass_kg <= high:
-        stature = "" if height_m is None else f" of {height_m:.2f} m"
-        reason = (
-            f"the plates measure {measured.mass_kg:.1f} kg, a person{stature} has {low:.0f} to "
-        )
+    if usual := _beyond_a_person(measured.mass_kg, height_m):
         unit = force_unit(measured.mass_kg, None, height_m, _PERCENT, _LIKELY)
-        reason += f"{high:.0f}" + (f"; {_IN_UNIT.format(unit)}" if unit else "")
+        reason = f"the plates measure {measured.mass_kg:.1f} kg, {usual}"
+        reason += f"; {_IN_UNIT.format(unit)}" if unit else ""
         return replace(unknown(reason), of_nobody=True)
     return measured
+
+
+def _beyond_a_person(mass_kg: float, height_m: float | None) -> str:
+    """What a person, of this stature where it is known, has; empty if the mass is a person's."""
+    low, high = (LEAST_KG, MOST_KG) if height_m is None else np.array(BMI_KG_M2) * height_m**2
+    stature = "" if height_m is None else f" of {height_m:.2f} m"
+    is_usual = low <= mass_kg <= high
+    return "" if is_usual else f"a person{stature} has {low:.0f} to {high:.0f}"
 
 
 def differing_plates(
@@ -340,8 +344,19 @@ class Comparison:
         apart = percent_apart(self.measured.mass_kg, self.total_kg)
         return apart > self.gross_percent + self.measured.half_width_percent
 
+    @property
+    def is_of_the_forces(self) -> bool:
+        """A person of this stature may have the stated mass, and none as much as the plates show;
+        what they show too little may be borne by something else."""
+        own_kg = self.measured.mass_kg - self.load_kg
+        is_more = own_kg > self.stated_kg and _beyond_a_person(own_kg, self.height_m)
+        return bool(is_more) and not _beyond_a_person(self.stated_kg, self.height_m)
+
     def likely(self) -> str:
-        """What the stated number is likely to be; empty if it is none of the known mistakes."""
+        """What the stated number is likely to be; empty if it is none of the known mistakes, or the
+        mistake is in the forces."""
+        if self.is_of_the_forces:
+            return ""
         for name, factor in _UNITS if self.measured.mass_kg >= LEAST_KG else ():
             if self._meets(self.stated_kg / factor):
                 return f"{self.stated_kg:g} is likely to be in {name}"
@@ -366,6 +381,11 @@ class Comparison:
             units = (_IN_UNIT.format(name) for name, kg in stated.items() if self._meets(kg))
             nothing_known = "a typing mistake, another person's row, plates of another gain, or a "
             nothing_known += "second person or a load on them"
+            if self.is_of_the_forces:
+                usual = _beyond_a_person(self.measured.mass_kg - self.load_kg, self.height_m)
+                times = self.measured.mass_kg / self.total_kg
+                nothing_known = f"{usual}: forces of another unit or gain, {times:.3g} times as "
+                nothing_known += "large as the stated mass makes them"
             remark = f"; {self.likely() or next(units, nothing_known)}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "

@@ -35,6 +35,7 @@ from bsip_cli.recordings.trunk_motion import low_pass, trunk_reach_m_s2
 
 _ABSURD_N = 15_000.0
 _LIGHTLY_LOADED_N = 20.0
+_ROUNDING_N = 1e-6
 _PULL_SHARE = 0.2  # of the push's impulse
 _WINDOW_S = 0.1
 _QUIET_SHARE = 0.05  # of the mean load: more is movement, in which both feet press at once
@@ -120,7 +121,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
             findings.append(fault)
             missing.append(source)
             continue
-        findings += source.findings(verdict.reading)
+        findings += [*source.findings(verdict.reading), *_without_side_force(plate)]
         plates.append(plate)
         if verdict.reading.sign < 0:
             findings.append(_reversed(plate))
@@ -250,6 +251,20 @@ def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
     else:
         return None
     return Finding(check, plate.name, found, expected, "left the plate out", "excluded")
+
+
+def _without_side_force(plate: Plate) -> list[Finding]:
+    """Of a plate that measures no horizontal force under its load, along one axis or both."""
+    loaded = plate.usable & (plate.lift_N > LOADED_N)
+    side = np.abs(plate.force_N[loaded, :2]).max(axis=0, initial=0.0)
+    axes = [name for name, most in zip("XY", side, strict=True) if most <= _ROUNDING_N]
+    if not (loaded.any() and axes):
+        return []
+    found = f"no horizontal force along the lab's {' and '.join(axes)} whatever it bears"
+    expected = "a force of three components"
+    action = "took it as zero, though nobody stands without pushing sideways; look whether "
+    action += "the export lacks it"
+    return [Finding("plate_force", plate.name, found, expected, action, "warning")]
 
 
 def _reversed(plate: Plate) -> Finding:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import click
@@ -194,11 +195,11 @@ class _Voice:
             return
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
-            general = re.sub(_NAME, "it", re.sub(_IN_A_PATH, "...", sentence))
+            whose = match.group() if (match := re.search(_NAME, sentence)) else outcome.unit
+            general = re.sub(_NAME, partial(_named, whose), re.sub(_IN_A_PATH, "...", sentence))
             if outcome.stage == "ingest":  # whose quality table has the times
                 general = re.sub(_TIMES, "at times", general)
             alike = self.said.setdefault((outcome.stage, general), {})
-            whose = match.group() if (match := re.search(_NAME, sentence)) else outcome.unit
             is_of_the_first = next(iter(alike), whose) == whose
             if is_finding or (is_of_the_first and sentence not in alike.get(whose, ())):
                 _say(outcome, sentence)
@@ -219,6 +220,13 @@ class _Voice:
         for which, names in kept.items():
             said = f"{listed(sorted(names))}: left out of {which}, since an input was refused"
             tqdm.write(said, file=sys.stderr)
+
+
+def _named(whose: str, match: re.Match[str]) -> str:
+    """A name in what is said of ``whose``, as it may be said of others alike."""
+    if (name := match.group()) == whose:
+        return "it"
+    return "one of its trials" if name.startswith(f"{whose}_") else "another trial"
 
 
 def _say(outcome: Outcome, sentence: str) -> None:

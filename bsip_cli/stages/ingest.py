@@ -18,7 +18,7 @@ from bsip_cli.recordings.contacts import (
     contact_windows,
     foot_contacts,
 )
-from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
+from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set, with_numbers_placed, with_pairs_named
 from bsip_cli.recordings.measured_mass import (
@@ -58,8 +58,7 @@ def run(unit: Unit) -> None:
     match = match_labels(recording.labels, marker_set.wanted(), **how)
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
-    recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *about_set, *placed, *paired, *match.findings, *repeats]
+    findings = [*recording.findings, *about_set, *placed, *paired, *match.findings]
     zeros: dict[str, list[float]] = {}
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed, zeros = without_zeros(recording)
@@ -76,7 +75,7 @@ def run(unit: Unit) -> None:
     rates = {name: getattr(recording, name) for name in ("marker_rate_hz", "analog_rate_hz")}
     facts = {"marker_set": marker_set.name} | rates
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
-    contacts, intervals, about_mass = _contacts(
+    contacts, intervals, about_mass, apart = _contacts(
         unit, recording, filled.markers_m, segments, plates, stated_mass(unit, person)
     )
     table, tolerance = unit.person, unit.config.ingest.mass_tolerance_percent
@@ -92,7 +91,10 @@ def run(unit: Unit) -> None:
     times = recording.time_s()
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
-    known = {"mass_stretches": [one.record() for one in intervals], "zeros": zeros}
+    stretches = [one.record() for one in intervals]
+    said_apart = [f"plate {one.subject} contradicts another: {one.found}" for one in apart]
+    known = {"mass_stretches": stretches, "plates_apart": said_apart}
+    known |= {"zeros": zeros}
     unit.write("wrench", _wrench_table(times, plates, contacts), facts | known)
     corners = [
         {"plate": plate.name, "corner": k} | dict(zip(XYZ, corner, strict=True))
@@ -130,9 +132,9 @@ def _contacts(
     segments: list[str],
     plates: tuple[Plate, ...],
     stated: StatedMass | None,
-) -> tuple[Contacts, tuple[momentum_mass.Interval, ...], list[Finding]]:
-    """When what is on the plates, the intervals that show the mass, and what is said of that;
-    markers_m (N, m, 3) on segments (m)."""
+) -> tuple[Contacts, tuple[momentum_mass.Interval, ...], list[Finding], list[Finding]]:
+    """When what is on the plates, the intervals that show the mass, what is said of that, and of
+    that what plates say against each other; markers_m (N, m, 3) on segments (m)."""
     rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
     markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
@@ -141,13 +143,13 @@ def _contacts(
     mass, stands_kg, about_mass = _mass_on_plates(unit, stated, intervals)
     alone = momentum_mass.intervals_alone(markers, feet, plates, rate_hz)
     stated_kg = None if stated is None else stated.mass_kg + unit.load_kg()
-    about_mass += differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
+    apart = differing_plates(alone, stated_kg, unit.config.ingest.mass_gross_percent)
     if mass is None:
         loaded = feet.valid & momentum_mass.upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
     reach = momentum_mass.body_reach_m_s2(markers, rate_hz)
     contacts = contact_windows(feet, trunk, mass, rate_hz, stands_kg, reach)
-    return contacts, intervals, about_mass
+    return contacts, intervals, [*about_mass, *apart], apart
 
 
 def _mass_on_plates(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,9 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     measured = measured_mass(
         intervals, unit.config.ingest.mass_half_width_percent, height_m, static
     )
+    apart = {t.stem: unit.facts("wrench", t)["plates_apart"] for t in trials}
+    if said := [f"in {name} {each[0]}" for name, each in apart.items() if each]:
+        measured = replace(measured, mass_kg=float("nan"), reason=said[0])
     alone = {t.stem: intervals[t.stem] for t in trials if not load_words(unit, t)}
     if fault := differing_trials(alone, unit.config.ingest.mass_gross_percent):
         unit.say(fault)
@@ -109,12 +112,16 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
 
 def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
     """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
-    none; else nothing is known to be wrong with either, and the stated one stays."""
+    none, as where it is in the forces, which fit no mass; else nothing is known to be wrong with
+    either, and the stated one stays."""
     plates_kg = comparison.measured.mass_kg if is_sure else float("nan")
     used, source = plates_kg, PLATES if is_sure else UNKNOWN
-    if not comparison.likely():
+    remedy = "correct mass_kg in participants.tsv"
+    if comparison.is_of_the_forces:
+        used, source, remedy = float("nan"), UNKNOWN, "correct the forces"
+    elif not comparison.likely():
         used, source = stated.mass_kg, stated.source
-    what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"
-    note = f"{comparison.sentence(stated.source)}; {what}: correct mass_kg in participants.tsv"
+    what = f"{used:.2f} kg is used" if np.isfinite(used) else "no mass is used"
+    note = f"{comparison.sentence(stated.source)}; {what}: {remedy}"
     unit.say(note)
     return PersonMass(used, source, plates_kg, note)

@@ -15,6 +15,7 @@ import pandas as pd
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
+from bsip_cli.recordings.gaps import without_repeats
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.measured_mass import plate_gains
@@ -157,7 +158,8 @@ def _surveyed(
 def opened(
     unit: Unit, trial: Trial, written: Written = AS_WRITTEN, gains: Mapping[str, float] = NO_GAINS
 ) -> Opened:
-    """A trial's recording, of the plates that count and of the person whose markers do."""
+    """A trial's recording, of the plates that count and of the person whose markers do, without
+    positions that repeat the last one."""
     found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
     found = found.as_written(written).with_gains(gains)
     if prefix := prefix_of(unit):
@@ -166,7 +168,9 @@ def opened(
         labels = tuple(recording.labels[k] for k in own)
         recording = replace(recording, labels=labels, markers_m=recording.markers_m[:, own])
         found = replace(found, recording=recording)
-    return found.with_plates(unit.config.ingest.plates)
+    recording, repeats = without_repeats(found.recording)
+    recording = replace(recording, findings=(*recording.findings, *repeats))
+    return replace(found, recording=recording).with_plates(unit.config.ingest.plates)
 
 
 def prefix_of(unit: Unit) -> str:

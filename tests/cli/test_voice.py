@@ -41,6 +41,17 @@ def test_of_the_study_it_is_said_whom_a_remark_is_of(capsys):
     assert "the same of sub-2, sub-3: participants.tsv: height_m 168 of it is in cm" in text
 
 
+def test_another_recording_is_not_called_by_whom_it_is_said_of(capsys):
+    names = "sub-1_task-a", "sub-1_task-b"
+    lines = [f"{one}: as long as {two}" for one, two in (names, names[::-1])]
+    pairs = zip(names, lines, strict=True)
+    text = told(capsys, [Outcome("ingest", name, "done", (line,)) for name, line in pairs])
+    assert f"ingest: the same of {names[1]}: as long as another trial" in text
+    of_person = [f"sub-{k}: not of one body: sub-{k}_task-a" for k in (1, 2)]
+    text = told(capsys, [Outcome("scale", one[:5], "done", (one,)) for one in of_person])
+    assert "the same of sub-2: not of one body: one of its trials" in text
+
+
 def test_a_remark_at_other_times_is_the_same(capsys):
     when = ("0.17 to 0.68 s, 1.90 to 2.42 s and 3 more", "0.00 to 0.25 s", "2.32 to 2.86 s")
     outcomes = [

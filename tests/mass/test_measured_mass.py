@@ -316,6 +316,19 @@ def test_what_is_no_known_mistake_is_said_without_a_guess(stated_kg, plates_kg, 
     assert ("second person or a load" in sentence) != bool(unit)
 
 
+@pytest.mark.parametrize(("stated_kg", "times"), [(70.0, 9.80665), (27.7, 9.80665), (62.0, 1000.0)])
+@pytest.mark.parametrize("height_m", [1.33, None])
+def test_forces_that_nobody_of_this_stature_makes_are_wrong_and_not_the_stated_mass(
+    stated_kg, times, height_m
+):
+    comparison = compared(stated_kg, times * stated_kg, height_m=height_m)
+    is_nobody = height_m is not None or times * stated_kg > 400.0
+    assert comparison.is_of_the_forces == is_nobody
+    sentence = comparison.sentence("participants.tsv")
+    assert (f"forces of another unit or gain, {times:.3g} times as large" in sentence) == is_nobody
+    assert ("kilograms that were divided by 9.81" in sentence) != is_nobody
+
+
 @pytest.mark.parametrize(
     ("stated_kg", "level"), [(70.0, "info"), (71.0, "info"), (66.0, "warning"), (78.0, "warning")]
 )

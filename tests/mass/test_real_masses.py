@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from bsip_cli.config import load_config
+from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.recordings.measured_mass import MeasuredMass, measured_mass
 from bsip_cli.recordings.momentum_mass import Interval
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages import ingest, survey
+from bsip_cli.stages.person_mass import person_mass
 from bsip_cli.study.study import load_study
 
 pytestmark = [pytest.mark.real, pytest.mark.long]
@@ -39,6 +41,13 @@ NOTHING = (
 
 def told(data: Path, name: str, folder: Path) -> MeasuredMass:
     """What one recording tells alone."""
+    config, unit = ingested(data, name, folder)
+    stretches = [Interval.of(record) for record in unit.facts("wrench")["mass_stretches"]]
+    return measured_mass({name: stretches}, config.ingest.mass_half_width_percent)
+
+
+def ingested(data: Path, name: str, folder: Path) -> tuple[Config, Unit]:
+    """One recording, of a person of whom nothing is stated."""
     source = data / name
     study = folder / source.stem
     (study / "sub-01").mkdir(parents=True, exist_ok=True)
@@ -56,8 +65,7 @@ def told(data: Path, name: str, folder: Path) -> MeasuredMass:
     survey.run(Unit(STAGES[0], found, out, config, person))
     unit = Unit(STAGES[1], found, out, config, person, person.trials[0])
     ingest.run(unit)
-    stretches = [Interval.of(record) for record in unit.facts("wrench")["mass_stretches"]]
-    return measured_mass({name: stretches}, config.ingest.mass_half_width_percent)
+    return config, unit
 
 
 @pytest.mark.parametrize("moving", sorted(set(MOVING) - set(NOTHING)))
@@ -77,3 +85,19 @@ def test_most_gait_tells_it(real_data, tmp_path):
 @pytest.mark.parametrize("name", NOTHING)
 def test_what_is_not_known_is_not_told(real_data, name, tmp_path):
     assert not told(real_data, name, tmp_path).is_known
+
+
+@pytest.mark.parametrize("gain", [0.5, 1.0])
+def test_of_plates_that_contradict_each_other_no_mass_is_taken(real_data, gain, tmp_path):
+    (tmp_path / "walk.trc").symlink_to(real_data / "opencap_subject4/walking1.trc")
+    lines = (real_data / "opencap_subject4/walking1_grf.mot").read_text().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("time"))
+    is_second = [one.startswith("ground_force_2_v") for one in lines[first].split()]
+    for k in range(first + 1, len(lines)):
+        cells = zip(map(float, lines[k].split()), is_second, strict=True)
+        lines[k] = "\t".join(f"{x * gain if own else x:.6f}" for x, own in cells)
+    (tmp_path / "walk_grf.mot").write_text("\n".join(lines) + "\n")
+    _, unit = ingested(tmp_path, "walk.trc", tmp_path / "study")
+    found = person_mass(unit, [unit.own_trial], 1.68)
+    assert ("plate 1 contradicts another: its vertical force shows" in found.note) == (gain != 1.0)
+    assert np.isnan(found.mass_kg) == (gain != 1.0)

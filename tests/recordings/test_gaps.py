@@ -310,6 +310,17 @@ def test_repeats_are_gaps_and_said(tmp_path):
     assert "at 0.20" in finding.found
 
 
+@pytest.mark.parametrize("outputs", [0, 3])
+def test_markers_that_are_held_all_through_a_walk(outputs):
+    """Beside numbers that are no places and hardly change, and that lie nearest to them."""
+    way = np.array([0.01, 0.0, 0.0]) * np.arange(N)[:, None, None]
+    scalars = np.random.default_rng(3).normal(0.0, 1e-4, (N, outputs, 3))
+    markers = np.concatenate([_walking() + way, scalars], axis=1)
+    markers[:, :2] = markers[0, :2]
+    held = held_markers(markers)
+    assert held[1:, :2].all() and not held[:, 2:].any()
+
+
 @pytest.mark.real
 @pytest.mark.parametrize(
     ("name", "n_frames"),

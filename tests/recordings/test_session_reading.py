@@ -201,6 +201,16 @@ def test_a_table_without_moments_shows_no_torque():
     assert np.isnan(torque).all()
 
 
+@pytest.mark.parametrize(("side", "axes"), [((0, 0), "X and Y"), ((1, 0), "Y"), ((1, 1), "")])
+def test_a_plate_without_side_forces_is_said(side, axes):
+    """In the axes of the lab, whatever moments are written beside it."""
+    sources = [replace(one, force_N=one.force_N * [*side, 1]) for one in of_table()]
+    found = assemble(opened(sources), SessionReading(plates={"1": Verdict(), "2": Verdict()}))
+    said = [one.found for one in found.findings if one.check == "plate_force"]
+    words = f"no horizontal force along the lab's {axes} whatever it bears"
+    assert said == [words] * (2 if axes else 0)
+
+
 def test_no_reading_is_tried_twice():
     trials = [TrialSamples.of(opened(of_c3d(moment_scale=1e-3)))]
     now = Hypothesis.as_stated(FrameChange(), trials, USUAL)

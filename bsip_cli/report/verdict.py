@@ -194,7 +194,8 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str], at_joints:
         wrong = probability_words(1 - probability_of(cause))
         return say("line_of_weight", group=cause, mass=wrong)
     if len(cause) > 1:
-        return say("line_of_group", n=len(cause), members=[*_members(cause)], sure=sure)
+        members, where = [*_members(cause)], _common_place(cause, everywhere)
+        return say("line_of_group", n=len(cause), members=members, where=where, sure=sure)
     (one,) = cause
     some = _MOST_NAMED < len(one.trials) < len(everywhere) and not one.is_of_all
     where = where_seen(one, everywhere)
@@ -218,7 +219,7 @@ def _members(cause: Sequence[Candidate]) -> Iterator[str]:
 
 def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """A cause, or a group of which one is there: what, how large, where and how probable."""
-    places, is_group = [where_seen(one, everywhere) for one in cause], len(cause) > 1
+    is_group = len(cause) > 1
     of_the_weight = cause[0].class_id == OF_THE_WEIGHT
     sure = []
     if words := probability_words(probability_of(cause)):
@@ -232,13 +233,19 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     return say(
         "cause",
         group=cause,
-        places=places,
-        common=places[0] if len(set(places)) == 1 else "",
+        places=[where_seen(one, everywhere) for one in cause],
+        common=_common_place(cause, everywhere),
         sure=sure,
         letters=ascii_lowercase,
         of_the_weight=of_the_weight,
         steps=of_causes.separating_recording(members, _MOST_STEPS) if is_group else "",
     )
+
+
+def _common_place(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
+    """Where all of a group are seen; empty if in different recordings."""
+    places = {where_seen(one, everywhere) for one in cause}
+    return places.pop() if len(places) == 1 else ""
 
 
 def where_seen(one: Candidate, everywhere: Sequence[str]) -> str:

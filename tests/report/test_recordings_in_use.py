@@ -428,7 +428,7 @@ def test_all_members_of_a_group_are_named():
     for effect in ("added_mass", "plate_drift"):
         assert effect_title(effect) in line
     assert f"{effect_title('plate_rotation')} (2 places)" in line
-    assert line.endswith("Together 99.0 %.")
+    assert line.endswith("; only in basketball (run 1). Together 99.0 %.")
 
 
 def test_findings_without_room_are_named_with_their_numbers(record):

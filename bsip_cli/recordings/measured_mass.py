@@ -385,7 +385,7 @@ class Comparison:
                 usual = _beyond_a_person(self.measured.mass_kg - self.load_kg, self.height_m)
                 times = self.measured.mass_kg / self.total_kg
                 nothing_known = f"{usual}: forces of another unit or gain, {times:.3g} times as "
-                nothing_known += "large as the stated mass makes them"
+                nothing_known += "large as the stated mass makes them, or a second person or a load"
             remark = f"; {self.likely() or next(units, nothing_known)}"
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "

@@ -16,7 +16,6 @@ from bsip_cli.recordings.c3d_format import Group, texts, whole_numbers
 from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.c3d_plates import plate_surfaces, read_plates
 from bsip_cli.recordings.gaps import without_absurd, without_sentinels
-from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.plate_reading import Opened
@@ -182,18 +181,11 @@ def _about_invalid(positions_m: np.ndarray, rate_hz: float, path: Path) -> Findi
 
 
 def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
-    """POINT:LABELS with its continuations; duplicates, and mere numbers, by POINT:DESCRIPTIONS if
-    these name them."""
+    """POINT:LABELS with its continuations; duplicates by POINT:DESCRIPTIONS if these name them."""
     labels, descriptions = (
         (texts(group, name) + [""] * n_points)[:n_points] for name in ("LABELS", "DESCRIPTIONS")
     )
     counts = Counter(labels)
-    if numbers := [i for i, label in enumerate(labels) if label.isdigit()]:
-        named = [descriptions[i] if i in numbers else label for i, label in enumerate(labels)]
-        if len({*named}) == len(named) and len(meanings(named)) > len(numbers) / 2:
-            found, expected = f"{len(numbers)} labels are mere numbers", "names of markers"
-            words = found, expected, "named them by POINT:DESCRIPTIONS"
-            return named, [Finding("labels", "", *words, "corrected")]
     twice = [i for i, label in enumerate(labels) if counts[label] > 1 and not is_unlabelled(label)]
     renamed = [descriptions[i] if i in twice else label for i, label in enumerate(labels)]
     resolved = len({renamed[i] for i in twice}) == len(twice) and all(

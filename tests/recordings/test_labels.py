@@ -163,18 +163,6 @@ def test_cut_labels_lose_only_what_is_doubled_and_not_described(tmp_path, has_de
     assert shared == ([] if has_descriptions else [doubled])
 
 
-@pytest.mark.parametrize("descriptions", [LABELS, ["marker"] * len(LABELS), None])
-def test_labels_that_are_mere_numbers_are_named_by_their_descriptions(tmp_path, descriptions):
-    numbers = [f"{k:04d}" for k in range(1, len(LABELS) + 1)]
-    places = np.tile(0.1 * (1.0 + np.arange(len(LABELS)))[:, None], (5, 1, 3))
-    parameters = {"DESCRIPTIONS": descriptions} if descriptions else None
-    path = write_c3d(tmp_path / "a.c3d", places, numbers, point_parameters=parameters)
-    recording = read_recording(path)
-    assert recording.labels == tuple(LABELS if descriptions == LABELS else numbers)
-    said = [one.found for one in recording.findings if one.check == "labels"]
-    assert any("are mere numbers" in one for one in said) == (descriptions == LABELS)
-
-
 # Y to the left: the lateral markers lie outside.
 ACROSS_M = {"LKNEL": 0.2, "LKNEM": 0.1, "RKNEL": -0.2, "RKNEM": -0.1, "LASIS": 0.12, "RASIS": -0.12}
 PAIRED = tuple(ACROSS_M)

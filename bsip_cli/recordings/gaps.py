@@ -317,9 +317,9 @@ def held_markers(markers_m: np.ndarray) -> np.ndarray:
 
     A run of equal positions is a hold if the nearest other markers, or all where it lasts most of
     the trial, move on meanwhile, by clearly more than the last digit, and the marker then jumps
-    after them. At the end of a trial there is
-    no jump: there it counts where numbers are fine and the marker never repeats itself elsewhere.
-    A foot on the ground in coarse numbers leaves its place by one digit, and is no hold.
+    after them. At the end of a trial there is no jump: there it counts where numbers are fine and
+    the marker never repeats itself elsewhere. A foot on the ground in coarse numbers leaves its
+    place by one digit, and is no hold.
     """
     held, same = np.zeros((2, *markers_m.shape[:2]), bool)
     if len(markers_m) <= _LEAST_FRAMES or markers_m.shape[1] <= _NEIGHBOURS:

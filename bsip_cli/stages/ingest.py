@@ -93,8 +93,7 @@ def run(unit: Unit) -> None:
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
     stretches = [one.record() for one in intervals]
     said_apart = [f"plate {one.subject} contradicts another: {one.found}" for one in apart]
-    known = {"mass_stretches": stretches, "plates_apart": said_apart}
-    known |= {"zeros": zeros}
+    known = {"mass_stretches": stretches, "plates_apart": said_apart, "zeros": zeros}
     unit.write("wrench", _wrench_table(times, plates, contacts), facts | known)
     corners = [
         {"plate": plate.name, "corner": k} | dict(zip(XYZ, corner, strict=True))
